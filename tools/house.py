@@ -18,7 +18,7 @@ from grimp import ImportGraph, build_graph
 PICTURE: Final = Path(__file__).parents[1] / "docs" / "images" / "house.svg"
 PACKAGES: Final = ("sim_tests", "awarenav", "nav_adapter", "tracking", "perception")
 
-_WIDTH: Final = 760
+_WIDTH: Final = 840
 _ROW: Final = 30
 _STYLE: Final = (
     "text { font: 14px sans-serif; fill: #1b1f27 } .name { font-weight: bold } "
