@@ -1,4 +1,4 @@
-"""Who and what moves about a hall before scanners: wanderers, and trolleys that people push."""
+"""Wanderers in a hall, and trolleys that people push, as scanners meet them."""
 
 from __future__ import annotations
 

@@ -275,15 +275,15 @@ class Addressing:
                         )
                     own_mps = self._governor.person_mps(then, courses, now, limit_mps)
                     limit_mps = min(limit_mps, own_mps)
-                own, (x, y) = courses.turned, _moved(person, _ANSWER_S + at_s).position_odom_m
-                way_m: float = own.cos * (x - own.x_m) + own.sin * (y - own.y_m)
-                way_m += BODY_RADIUS_M - own.rear_m
+                course, (x, y) = courses.turned, _moved(person, _ANSWER_S + at_s).position_odom_m
+                way_m: float = course.cos * (x - course.x_m) + course.sin * (y - course.y_m)
+                way_m += BODY_RADIUS_M - course.rear_m
                 if way_m <= 0.0:
                     return at_s
-                passes_mps: float = limit_mps - own.cos * vx - own.sin * vy
+                passes_mps: float = limit_mps - course.cos * vx - course.sin * vy
                 if way_m <= passes_mps * _STEP_S:
                     return at_s + way_m / passes_mps
-                here = here + _STEP_S * limit_mps * np.array([own.cos, own.sin])
+                here = here + _STEP_S * limit_mps * np.array([course.cos, course.sin])
             return _LONGEST_S
 
         return passing_s(0.0) - passing_s(self._lasts_s)

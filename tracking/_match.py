@@ -141,11 +141,12 @@ def matched(tracks: list[Track], step: Step) -> Match:
                 if track.confirmed and match.sights[row] is None
             ]
             offer(left, [column for column, one in enumerate(measured) if one.weak])
-    new = _new([measured[column] for column in strong], match, step.place_m[:2])
-    if not step.sensor.settings.sees_faces:
-        seen = [track for track, sight in zip(tracks, match.sights, strict=True) if sight]
-        new = [one for one in new if not any(is_other_leg(one, track) for track in seen)]
-    match.new = new
+    seen = [track for track, sight in zip(tracks, match.sights, strict=True) if sight]
+    match.new = [
+        one
+        for one in _new([measured[column] for column in strong], match, step.place_m[:2])
+        if not any(is_other_leg(one, track, step) for track in seen)
+    ]
     return match
 
 
@@ -174,9 +175,9 @@ def is_same_body(first: Measurement, second: Measurement) -> bool:
     return (first.x - second.x) ** 2 + (first.y - second.y) ** 2 <= _DOUBLE_M**2
 
 
-def is_other_leg(one: Measurement, track: Track) -> bool:
-    """Return whether a place is on the way of somebody who walks, within a stride."""
-    if not track.confirmed or track.speed_mps < WALKING_MPS:
+def is_other_leg(one: Measurement, track: Track, step: Step) -> bool:
+    """Return whether a scanner sees a place on the way of somebody who walks, within a stride."""
+    if step.sensor.settings.sees_faces or not track.confirmed or track.speed_mps < WALKING_MPS:
         return False
     dx, dy = one.x - track.x, one.y - track.y
     along_m = (dx * track.vx + dy * track.vy) / track.speed_mps
@@ -266,16 +267,21 @@ def _associate(
     partner = {row: column for column, row in owner.items()}
     for row, column in partner.items():
         match.sights[row] = edges[row][column]
-    reach2, legs = AMBIGUITY_M**2, not step.sensor.settings.sees_faces
+    reach2 = AMBIGUITY_M**2
     for row, found in edges.items():
         for column, sight in found.items():
             holder = owner.get(column)
             if holder == row:
                 continue
             own = match.sights[row] if row in partner else None
-            again = own is not None and is_same_body(sight.given, own.given)
-            again = again or (legs and is_other_leg(sight.given, tracks[row]))
-            if own is not None and holder is None and again:
+            if (
+                own is not None
+                and holder is None
+                and (
+                    is_same_body(sight.given, own.given)
+                    or is_other_leg(sight.given, tracks[row], step)
+                )
+            ):
                 own.evidence = _lower(own.evidence, sight.given.evidence)
                 continue
             # The track could have matched this measurement, …

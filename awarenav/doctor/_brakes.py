@@ -1,4 +1,4 @@
-"""How a robot brakes, from its odometry: how hard, and how far off the curve that it was on."""
+"""Brakings in odometry: how hard they are, and how far they lead off the robot's curve."""
 
 from __future__ import annotations
 

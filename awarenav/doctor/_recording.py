@@ -189,11 +189,11 @@ def _brake_findings(topic: str, odometry: Sequence[Odometry]) -> list[Finding]:
     found = brakings(odometry)
     if not found:
         return []
-    weakest_mps2, *_, hardest_mps2 = sorted(2 * [each.deceleration_mps2 for each in found])
+    hard_mps2 = [each.deceleration_mps2 for each in found]
     off_deg = math.degrees(max(each.off_rad for each in found))
     text = (
-        f"{topic}: the robot braked {counted(len(found), 'time')}, by {weakest_mps2:.1f} to "
-        f"{hardest_mps2:.1f} m/s², and turned up to {off_deg:.0f}° off the curve that it was on"
+        f"{topic}: the robot braked {counted(len(found), 'time')}, by {min(hard_mps2):.1f} to "
+        f"{max(hard_mps2):.1f} m/s², and turned up to {off_deg:.0f}° off the curve that it was on"
     )
     if off_deg <= _ON_CURVE_DEG:
         return [Finding.fine("brakes", f"{text}: brakes_on_curve: true held here")]

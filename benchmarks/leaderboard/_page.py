@@ -237,14 +237,18 @@ def steps_out() -> dict[str, str]:
             for of in board.templates
         ],
     )
-    most = f"{100.0 * proportion_interval(0, board.seeds).high:.0f} %"
     measured = "; ".join(dict.fromkeys(map(_measured, read_about(STEP_OUT).values())))
     return {
         "steps_out": table.markdown(),
         "step_outs": str(board.seeds),
-        "step_out_rate": most,
+        "step_out_rate": rate_left(board),
         "step_out_measured": textwrap.fill(f"({measured}):", 100),
     }
+
+
+def rate_left(board: Board) -> str:
+    """Return the true rate of touches that remains possible where a scenario had none."""
+    return f"{100.0 * proportion_interval(0, board.seeds).high:.0f} %"
 
 
 def touched(each: Standing, scenario: str) -> str:

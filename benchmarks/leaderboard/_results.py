@@ -15,7 +15,7 @@ from sim_tests.demo import reported_table, reported_text
 from sim_tests.study.measures import EpisodeRecord, Interval, bootstrap_interval, paired
 from sim_tests.study.report import Table
 
-from ._page import ROBOTS, Standing, standings, steps_out, touched
+from ._page import ROBOTS, Standing, rate_left, standings, touched
 from ._rows import RESULTS, ROOT, STEP_OUT, Board
 
 _AWARE, _BLIND, _TODAY, _COSTMAP = ROBOTS
@@ -64,9 +64,8 @@ def figures(board: Board, folder: Path = RESULTS) -> dict[str, str]:
 def _hazards(board: Board, folder: Path) -> str:
     """Return the figures of the hazards in the safety argument, of awarenav and of today's AMR."""
     named = {each.row.name: each for each in standings(board, folder)}
-    steps = {each.row.name: each for each in standings(Board.read(STEP_OUT), STEP_OUT)}
-
-    few = steps_out()
+    few = Board.read(STEP_OUT)
+    steps = {each.row.name: each for each in standings(few, STEP_OUT)}
 
     def both(scenario: str) -> str:
         """Say how often the two touched somebody in a scenario of people who step out."""
@@ -79,8 +78,8 @@ def _hazards(board: Board, folder: Path) -> str:
     lines = (
         f"H3: of people who had looked and [stepped out](what_it_wins.md#people-who-step-out), the "
         f"moving `balanced` touched {both('steps_out_near_aware')} who stood near, and "
-        f"{both('steps_out_far_aware')} who stood farther away; 0 of {few['step_outs']} leaves a "
-        f"true rate of up to {few['step_out_rate']}.",
+        f"{both('steps_out_far_aware')} who stood farther away; 0 of {few.seeds} leaves a true "
+        f"rate of up to {rate_left(few)}.",
         f"H4: of people who step out behind a cart it touched {both('steps_out_behind_cart')}.",
         f"H14: impacts per 1 000 meetings if those who never noticed it start to 1.6 m/s (time "
         f"constant 0.35 s): {impacts(_AWARE, 'stress_never')}; today's AMR "
