@@ -124,8 +124,11 @@ class Candidates:
         Many candidates begin with the same command, since few are in the window of one tick.
         """
         commands = self.commands.reshape(-1, self.commands.shape[-1])
-        distinct, index = np.unique(commands, axis=0, return_inverse=True)
-        return distinct, index.reshape(self.allowed.shape)
+        number = np.zeros(len(commands), dtype=np.intp)
+        for column in commands.T:  # faster than np.unique of whole rows
+            number = len(commands) * number + np.unique(column, return_inverse=True)[1]
+        _, first, index = np.unique(number, return_index=True, return_inverse=True)
+        return commands[first], index.reshape(self.allowed.shape)
 
 
 class Drive(ABC):
