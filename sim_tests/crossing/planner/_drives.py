@@ -326,8 +326,8 @@ class Sideways(Drive):
             now_rad = math.remainder(math.atan2(velocity[1], velocity[0]) - bearing_rad, math.tau)
         # Each direction, and the present one, once with a turn to the goal, and once without.
         offsets = np.tile(np.append(_WIDEST_RAD * self._spread, now_rad), 2)
-        most = _CALM_SHARE * min(limits.yaw_rate_radps, limits.fastest_point_mps / limits.reach_m)
-        turn_radps = min(max(bearing_rad / self._sampling.turn_time_s, -most), most)
+        calm = _CALM_SHARE * min(limits.yaw_rate_radps, limits.fastest_point_mps / limits.reach_m)
+        turn_radps = min(max(bearing_rad / self._sampling.turn_time_s, -calm), calm)
         yaw_rates = np.where(np.arange(len(offsets)) < len(offsets) // 2, turn_radps, 0.0)
         speeds = tick.top_mps * self._speed_share
         speeds[-1] = min(state.travel_mps, tick.top_mps)
