@@ -11,7 +11,6 @@ from ._choice import (
     refuse_unusable_planner,
     seeded_generators,
 )
-from ._config import PlannerConfig
-from ._local_planner import CostmapPlanner, LocalPlanner, SeatedPlanner, StraightOn
+from ._costmap import CostmapPlanner
+from ._local_planner import LocalPlanner, SeatedPlanner, StraightOn
 from ._reference import ReferencePlanner
-from ._sampling_planner import SamplingPlanner

@@ -24,7 +24,8 @@ from perception.arrays import FloatArray
 from ...conditions import REFERENCE_PLANNER
 from ...scenario import Scenario
 from ...world.errors import SimError
-from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
+from ._costmap import CostmapPlanner
+from ._local_planner import LocalPlanner, StraightOn
 from ._reference import ReferencePlanner
 
 # Arguments by these names receive the robot's profile, the racks and walls, the way from start to

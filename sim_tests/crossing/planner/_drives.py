@@ -5,19 +5,22 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from itertools import compress
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nav_adapter import NavConstraints, RobotProfile, RobotState
+from nav_adapter import RobotProfile, RobotState
 from perception.arrays import FloatArray
 
-from ._config import PlannerConfig
 from ._geometry import Poses, clip_to_window, follow_arcs, ramp_integral, stopping_integral
+from ._sampling import YAW_RATE_RADPS, Sampling, along_time
 from ._scene import Aim, Scene
 
+# Number of target speeds from 0 to the highest allowed, and of yaw rates from one limit to the
+# other, denser near 0. The present speed and yaw rate, and the rate that faces the goal, are added.
+_SPEEDS: Final = 7
+_YAW_RATES: Final = 17
 # Number of checked poses of a braking robot; the last one is at rest. From 1.5 m/s at 1 m/s² they
 # are at most 0.1 s apart. At a closing speed of 3 m/s this cuts a corner by less than the
 # clearance.
@@ -51,21 +54,6 @@ class TwistLimits:
     yaw_rate_radps: float
     reach_m: float
     curvature_per_m: float
-
-    @classmethod
-    def of(
-        cls, robot: RobotProfile, config: PlannerConfig, constraints: NavConstraints
-    ) -> TwistLimits:
-        """Return the limits of ``robot`` under ``constraints``."""
-        assert constraints.fastest_point_limit_mps is not None
-        radius_m = robot.min_turning_radius_m
-        return cls(
-            min(constraints.speed_limit_mps, robot.max_speed_mps),
-            constraints.fastest_point_limit_mps,
-            config.max_yaw_rate_radps,
-            robot.circumscribed_radius_m,
-            math.inf if radius_m is None else 1.0 / radius_m,
-        )
 
     def most_yaw_rate_radps(self, speed_mps: FloatArray) -> FloatArray:
         """Return the largest yaw rate, either way, at each speed ≥ 0."""
@@ -112,7 +100,8 @@ class Candidates:
         allowed: (V, W) whether the command obeys the limits, or brakes as hard as it can.
         poses: the motion over the horizon; its arrays broadcast to (T, V, W).
         course: cosine and sine of the direction of travel at its end, in the base frame.
-        turning: share of the largest turn, left positive.
+        turning: yaw rate over 1.2 rad/s, left positive, of a holonomic robot the direction over
+            the widest one.
         turning_now: the same of the present motion.
     """
 
@@ -123,35 +112,38 @@ class Candidates:
     turning: FloatArray
     turning_now: float
 
-    def distinct(self) -> tuple[FloatArray, NDArray[np.intp]]:
-        """Return the distinct allowed commands (N, 2 or 3), and the index (V, W) of each in them.
+    def off_rad(self, to_x_m: FloatArray, to_y_m: FloatArray) -> FloatArray:
+        """Return by how much (V, W) each motion ends going past a place, given from (T, V, W)."""
+        c, s = self.course
+        x, y = to_x_m[-1], to_y_m[-1]
+        return np.asarray(np.abs(np.arctan2(y * c - x * s, x * c + y * s)))
 
-        Many candidates begin with the same command, since few are in the window of one tick. The
-        index of a command that is not allowed is N.
+    def distinct(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        """Return the distinct commands (N, 2 or 3), and the index (V, W) of each in them.
+
+        Many candidates begin with the same command, since few are in the window of one tick.
         """
-        size = self.commands.shape[-1]
-        commands = list(map(tuple, self.commands.reshape(-1, size).tolist()))
-        distinct = dict.fromkeys(compress(commands, self.allowed.ravel().tolist()))
-        index = dict(zip(distinct, range(len(distinct)), strict=True))
-        where = np.array([index.get(command, -1) for command in commands], dtype=np.intp)
-        where = np.where(self.allowed, where.reshape(self.allowed.shape), len(index))
-        return np.array(list(index), dtype=np.float64).reshape(-1, size), where
+        commands = self.commands.reshape(-1, self.commands.shape[-1])
+        number = np.zeros(len(commands), dtype=np.intp)
+        for column in commands.T:  # faster than np.unique of whole rows
+            number = len(commands) * number + np.unique(column, return_inverse=True)[1]
+        _, first, index = np.unique(number, return_index=True, return_inverse=True)
+        return commands[first], index.reshape(self.allowed.shape)
 
 
 class Drive(ABC):
     """The kinematics of a robot."""
 
-    def __init__(self, robot: RobotProfile, config: PlannerConfig) -> None:
+    def __init__(self, robot: RobotProfile, sampling: Sampling) -> None:
         self._robot = robot
-        self._config = config
+        self._sampling = sampling
         self._steers = robot.min_turning_radius_m is not None
-        samples = max(2, math.ceil(config.horizon_s / config.step_s))
-        self._t_s = along_time(config.horizon_s / samples, config.horizon_s, samples)
-        self._turn_t_s = np.minimum(self._t_s, config.turn_time_s)
+        self._t_s = sampling.times_s
+        self._turn_t_s = np.minimum(self._t_s, sampling.turn_time_s)
         self._braking_share = along_time(0.0, 1.0, _BRAKING_SAMPLES)
         # The last row is the present speed, so that a robot on a curve can go on as it is.
-        self._speed_share = np.append(np.linspace(0.0, 1.0, config.speed_samples), 1.0)[:, None]
-        spread = np.linspace(-1.0, 1.0, config.yaw_rate_samples)
+        self._speed_share = np.append(np.linspace(0.0, 1.0, _SPEEDS), 1.0)[:, None]
+        spread = np.linspace(-1.0, 1.0, _YAW_RATES)
         self._spread = np.sign(spread) * np.abs(spread) ** 1.5
 
     @abstractmethod
@@ -182,7 +174,7 @@ class Drive(ABC):
         """Return the time in which a turn ends: with the speed, or later if it has to."""
         if self._steers:
             return stop_s
-        own_s = np.abs(yaw_rate_radps) / self._config.max_yaw_acceleration_radps2
+        own_s = np.abs(yaw_rate_radps) / self._sampling.yaw_acceleration_radps2
         return np.asarray(np.maximum(stop_s, own_s))
 
 
@@ -193,8 +185,8 @@ class Wheels(Drive):
     curve; any other one chooses speed and yaw rate apart.
     """
 
-    def __init__(self, robot: RobotProfile, config: PlannerConfig) -> None:
-        super().__init__(robot, config)
+    def __init__(self, robot: RobotProfile, sampling: Sampling) -> None:
+        super().__init__(robot, sampling)
         self._turn_m = _TURN_SHARE * (robot.min_turning_radius_m or 0.0)
         # Two more are filled in for each plan: the present rate, and the one that faces the goal.
         self._yaw_share = np.append(self._spread, [0.0, 0.0])
@@ -214,7 +206,7 @@ class Wheels(Drive):
         else:
             top_radps = min(limits.yaw_rate_radps, limits.fastest_point_mps / limits.reach_m)
             yaw_rates = top_radps * self._yaw_share
-            facing_radps = tick.aim.bearing_rad / self._config.turn_time_s
+            facing_radps = tick.aim.bearing_rad / self._sampling.turn_time_s
             yaw_rates[-2:] = [
                 min(max(rate, -top_radps), top_radps)
                 for rate in (state.yaw_rate_radps, facing_radps)
@@ -243,7 +235,7 @@ class Wheels(Drive):
         extra_m = np.maximum(state.speed_mps - v, 0.0) * dt_s
         # The yaw rate ramps from the present one.
         change = state.yaw_rate_radps - w
-        acceleration = self._config.max_yaw_acceleration_radps2
+        acceleration = self._sampling.yaw_acceleration_radps2
         extra_rad = 0.5 * change * np.minimum(np.abs(change) / acceleration, dt_s)
         poses = follow_arcs(
             stopping_integral(v, stop_s, dt_s, t_s) + extra_m,
@@ -272,18 +264,14 @@ class Wheels(Drive):
     ) -> Candidates:
         """Return candidates; a roll-out ends when it is as long as the distance to the aim.
 
-        Args:
-            tick: the situation.
-            speeds: (V, 1) final speeds.
-            turn_speeds: (V, W) speeds of the turns.
-            yaw_rates: (V, W) of the turns, or (W,).
-            commands: (V, W) speeds that the next tick reaches.
+        Speeds (V, 1) are final. Turns have speeds (V, W) and yaw rates (V, W) or (W,). Commands
+        (V, W) are the speeds that the next tick reaches.
         """
-        state, limits, most_yaw_radps = tick.state, tick.limits, self._config.max_yaw_rate_radps
+        state, limits = tick.state, tick.limits
         # The swing of the corners obeys the limit in the next tick already.
         most_radps = limits.most_yaw_rate_radps(np.abs(commands))
         turns = np.minimum(np.maximum(yaw_rates, -most_radps), most_radps)
-        step = self._config.max_yaw_acceleration_radps2 * tick.dt_s
+        step = self._sampling.yaw_acceleration_radps2 * tick.dt_s
         turns = clip_to_window(turns, state.yaw_rate_radps, step, step)
         if self._steers:  # the yaw rate falls with the speed
             tightest = np.abs(commands) * limits.curvature_per_m
@@ -298,8 +286,8 @@ class Wheels(Drive):
             allowed,
             poses,
             (poses.cos_heading[-1], poses.sin_heading[-1]),
-            yaw_rates / most_yaw_radps,
-            state.yaw_rate_radps / most_yaw_radps,
+            yaw_rates / YAW_RATE_RADPS,
+            state.yaw_rate_radps / YAW_RATE_RADPS,
         )
 
     def _roll_out(
@@ -310,7 +298,7 @@ class Wheels(Drive):
         faster, slower = robot.max_acceleration_mps2, robot.max_deceleration_mps2
         rate = np.where(slow > speed, faster, slower)
         turning_m = ramp_integral(speed, slow, rate, self._turn_t_s)
-        end_s = self._config.turn_time_s
+        end_s = self._sampling.turn_time_s
         after = clip_to_window(slow, speed, slower * end_s, faster * end_s)
         rate = np.where(speeds > after, faster, slower)
         path = turning_m + ramp_integral(after, speeds, rate, self._t_s - self._turn_t_s)
@@ -319,7 +307,7 @@ class Wheels(Drive):
             divisor = np.copysign(np.maximum(np.abs(slow), _SLOWEST_MPS), slow)
             turned_m = np.minimum(np.maximum(path, -self._turn_m), self._turn_m)
             return path, turned_m * (yaw_rates / divisor)
-        acceleration = self._config.max_yaw_acceleration_radps2
+        acceleration = self._sampling.yaw_acceleration_radps2
         return path, ramp_integral(state.yaw_rate_radps, yaw_rates, acceleration, self._turn_t_s)
 
 
@@ -338,7 +326,8 @@ class Sideways(Drive):
             now_rad = math.remainder(math.atan2(velocity[1], velocity[0]) - bearing_rad, math.tau)
         # Each direction, and the present one, once with a turn to the goal, and once without.
         offsets = np.tile(np.append(_WIDEST_RAD * self._spread, now_rad), 2)
-        turn_radps = self._facing_radps(limits, bearing_rad)
+        calm = _CALM_SHARE * min(limits.yaw_rate_radps, limits.fastest_point_mps / limits.reach_m)
+        turn_radps = min(max(bearing_rad / self._sampling.turn_time_s, -calm), calm)
         yaw_rates = np.where(np.arange(len(offsets)) < len(offsets) // 2, turn_radps, 0.0)
         speeds = tick.top_mps * self._speed_share
         speeds[-1] = min(state.travel_mps, tick.top_mps)
@@ -352,7 +341,7 @@ class Sideways(Drive):
         reached = np.hypot(commands[..., 0], commands[..., 1])
         most = limits.most_yaw_rate_radps(reached)
         turns = np.minimum(np.maximum(yaw_rates, -most), most)
-        step = self._config.max_yaw_acceleration_radps2 * tick.dt_s
+        step = self._sampling.yaw_acceleration_radps2 * tick.dt_s
         turns = clip_to_window(turns, state.yaw_rate_radps, step, step)
         fastest = reached + np.abs(turns) * limits.reach_m
         slowest = max(state.travel_mps - self._robot.max_deceleration_mps2 * tick.dt_s, 0.0)
@@ -391,12 +380,6 @@ class Sideways(Drive):
     def _velocity(self, state: RobotState) -> tuple[float, ...]:
         return state.speed_mps, state.lateral_mps
 
-    def _facing_radps(self, limits: TwistLimits, bearing_rad: float) -> float:
-        """Return the yaw rate that turns the robot to the direction to head for."""
-        most = min(limits.yaw_rate_radps, limits.fastest_point_mps / limits.reach_m)
-        most *= _CALM_SHARE
-        return min(max(bearing_rad / self._config.turn_time_s, -most), most)
-
     def _reached(self, targets: FloatArray, velocity: FloatArray, dt_s: float) -> FloatArray:
         """Return (V, W, 2) what a tick reaches of velocities, nearest on the straight way there."""
         robot = self._robot
@@ -423,8 +406,3 @@ class Sideways(Drive):
         far = np.maximum(np.hypot(x, y) / max(distance_m, 1e-6), 1.0)
         turn = turns * self._turn_t_s
         return Poses(x / far, y / far, np.cos(turn), np.sin(turn))
-
-
-def along_time(first: float, last: float, samples: int) -> FloatArray:
-    """Return (T, 1, 1) numbers from ``first`` to ``last``."""
-    return np.linspace(first, last, samples, dtype=np.float64)[:, None, None]

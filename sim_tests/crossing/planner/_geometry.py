@@ -145,26 +145,6 @@ def disc_gap_m(
     return np.asarray(np.sqrt(along * along + across * across) - radius_m)
 
 
-def strip_distance_m(
-    rel_x_m: FloatArray,
-    rel_y_m: FloatArray,
-    velocity_x_mps: FloatArray,
-    velocity_y_mps: FloatArray,
-    ahead_s: float,
-) -> FloatArray:
-    """Return the distance from points to the segments that people walk in the next ``ahead_s``.
-
-    ``rel_x_m`` and ``rel_y_m`` are point minus person. The segment of a standing person is a point.
-    """
-    speed2 = velocity_x_mps * velocity_x_mps + velocity_y_mps * velocity_y_mps
-    inverse = 1.0 / np.maximum(speed2, 1e-12)
-    along_s = rel_x_m * (velocity_x_mps * inverse) + rel_y_m * (velocity_y_mps * inverse)
-    along_s = np.minimum(np.maximum(along_s, 0.0), ahead_s)
-    off_x = rel_x_m - velocity_x_mps * along_s
-    off_y = rel_y_m - velocity_y_mps * along_s
-    return np.asarray(np.sqrt(off_x * off_x + off_y * off_y))
-
-
 def box_gap_m(rectangles: Rectangles, boxes_m: Iterable[Box]) -> FloatArray:
     """Return a lower bound of the distance from rectangles to the nearest axis-aligned box.
 

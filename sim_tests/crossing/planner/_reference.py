@@ -15,10 +15,11 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number
 
 from ...world.errors import SimError
-from ._drives import Tick, TwistLimits
+from ._drives import Tick
 from ._geometry import Poses, box_gap_m
-from ._sampling_planner import SamplingPlanner, within_next_limits
+from ._sampling import CLEARANCE_M
 from ._scene import Aim, Scene
+from ._window import DynamicWindow, within_next_limits
 
 # Ways are offsets to the left of the straight line to the goal.
 _OFFSETS_M: Final[FloatArray] = np.array(
@@ -74,20 +75,19 @@ class _Line(NamedTuple):
     length_m: float
 
 
-class ReferencePlanner(SamplingPlanner):
+class ReferencePlanner(DynamicWindow):
     """A planner that compares ways past people for twelve seconds ahead, under the limit there.
 
     Ways lead beside the straight line to the goal, at up to 1.4 m on either side, and begin at once
     or after waiting. The robot drives each of them as fast as
     :func:`~nav_adapter.exporters.speed_limit_at` says for these places and times, while people keep
-    to their motion. It follows the one that ends soonest, with the dynamic window of
-    :class:`SamplingPlanner`. What a way leaves to people's attention counts as time, too. So it
-    uses the room of an aisle before it needs it, passes people who walk ahead, and goes first only
-    where the limit lets it. Where there is no limit to plan with, as without people, the window
-    drives alone.
+    to their motion. It follows the one that ends soonest, with the dynamic window. What a way
+    leaves to people's attention counts as time, too. So it uses the room of an aisle before it
+    needs it, passes people who walk ahead, and goes first only where the limit lets it. Where there
+    is no limit to plan with, as without people, the window drives straight to the goal.
 
     Args:
-        robot: footprint and limits, as for :class:`SamplingPlanner`.
+        robot: footprint and limits; the footprint counts with its bounding rectangle.
         static_boxes_odom_m: (N, 4) fixed obstacles x_min, y_min, x_max, y_max; None for none.
 
     Raises:
@@ -112,7 +112,7 @@ class ReferencePlanner(SamplingPlanner):
         goal_odom_m = finite_array("goal_odom_m", goal_odom_m, (2,), SimError)
         dt_s = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
         goal = Aim.at(goal_odom_m, robot_state)
-        limits = TwistLimits.of(self.robot, self.config, constraints)
+        limits = self._limits(constraints)
         if constraints.speed_basis is None or not constraints.obstacles:
             return super().plan(robot_state, goal_odom_m, constraints, dt_s)
         if goal.distance_m < _ARRIVING_M or limits.speed_mps <= 0.0:
@@ -197,7 +197,7 @@ class ReferencePlanner(SamplingPlanner):
         outline = self._footprint.at(
             Poses(positions[..., 0], positions[..., 1], np.cos(headings), np.sin(headings))
         )
-        room = box_gap_m(outline, self._boxes_odom_m) >= self.config.clearance_m
+        room = box_gap_m(outline, self._boxes_odom_m) >= CLEARANCE_M
         stretch = np.hypot(1.0, slopes)
         field = _Field(limits_mps, unnoticed_mps, room, stretch, reach_m)
         price_s = _OFFSET_S * np.abs(_OFFSETS_M) + _LEFT_S * (_OFFSETS_M > 0.0)

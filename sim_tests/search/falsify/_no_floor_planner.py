@@ -9,7 +9,7 @@ from typing import Any, Final
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception.arrays import FloatArray
 
-from ...crossing.planner import PlannerConfig, SamplingPlanner
+from ...crossing.planner import ReferencePlanner
 
 #: Suffix of the policy's name in tables.
 LABEL: Final = "UNSAFE-NO-FLOOR"
@@ -23,8 +23,7 @@ class NoFloorPlanner:
     """The dynamic window without the adapter's floor: UNSAFE, to check that a search finds it.
 
     The adapter has no switch for this, and must not have one. This planner ignores the adapter's
-    radii and speed limits: every person is a point, no speed-and-separation rule holds, and nobody
-    is given way.
+    radii and speed limits: every person is a point, and no speed-and-separation rule holds.
 
     Args:
         robot: as for the reference planner.
@@ -33,9 +32,7 @@ class NoFloorPlanner:
 
     def __init__(self, robot: RobotProfile, static_boxes_odom_m: Any = None) -> None:
         self._robot = robot
-        # Giving way knows where people are, whatever their radius.
-        config = PlannerConfig.for_robot(robot).model_copy(update={"give_way_s": 0.0})
-        self._planner = SamplingPlanner(robot, static_boxes_odom_m, config)
+        self._planner = ReferencePlanner(robot, static_boxes_odom_m)
 
     def plan(
         self,
@@ -51,6 +48,6 @@ class NoFloorPlanner:
             speed_limit_mps=self._robot.max_speed_mps,
             reachable_speed_limit_mps=self._robot.max_speed_mps,
             fastest_point_limit_mps=math.inf,
-            speed_basis=None,  # what the planner foresees of the limits is the floor too
+            speed_basis=None,  # what the planner plans with is the floor too; its window remains
         )
         return self._planner.plan(robot_state, goal_odom_m, unconstrained, dt_s)

@@ -1,4 +1,4 @@
-"""The reference planner of robots that steer or move sideways, in closed loop."""
+"""The dynamic window of robots that steer or move sideways, in closed loop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from planner_scenes import DT_S, ROUNDING, constraints, drive, outline
 
 from nav_adapter import RobotProfile, RobotState
 from sim_tests.actors.robot import RobotModel
-from sim_tests.crossing.planner import SamplingPlanner
+from sim_tests.crossing.planner import CostmapPlanner, ReferencePlanner
 
 FORKLIFT = RobotModel.shipped("forklift").profile
 OMNI = RobotModel.shipped("omni").profile
@@ -30,7 +30,7 @@ def run(
     duration_s: float = 60.0,
 ) -> list[RobotState]:
     """Return the states until the robot stands at its goal, or the time is up."""
-    planner, states, now = SamplingPlanner(robot, boxes), [start], constraints(people or [], 1.2)
+    planner, states, now = CostmapPlanner(robot, boxes), [start], constraints(people or [], 1.2)
     while states[-1].stamp_s < duration_s:
         states.append(drive(states[-1], planner.plan(states[-1], goal, now, DT_S)))
         if math.dist(states[-1].position_odom_m, goal) < 0.25 and states[-1].travel_mps < 0.2:
@@ -112,7 +112,7 @@ def test_velocities_of_a_holonomic_robot_keep_the_limits(twist, limit_mps, peopl
     forward, left, yaw_rate = twist
     forward, left = (0.8 * each for each in (forward, left))
     state = RobotState(0.0, (0.0, 0.0), 0.2, forward, yaw_rate, np.array([forward, left]))
-    command = SamplingPlanner(OMNI, boxes).plan(
+    command = ReferencePlanner(OMNI, boxes).plan(
         state, (8.0, 0.0), constraints(people, limit_mps), DT_S
     )
     x, y, w = command

@@ -1,4 +1,4 @@
-"""The reference planner's commands within the limit of the robot's fastest point, and its curve."""
+"""Planners' commands within the limit of the robot's fastest point, and its curve."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from planner_scenes import AISLE, DT_S, ROUNDING, constraints, coordinate, drive
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from sim_tests.actors.robot import NOVA_CARTER
-from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
+from sim_tests.crossing.planner import CostmapPlanner, ReferencePlanner
+from sim_tests.crossing.planner._sampling import Sampling
 
 # A tricycle whose base origin lies on the rear axle, with forks behind it.
 TRICYCLE = RobotProfile(
@@ -50,7 +51,7 @@ def situations(draw: st.DrawFn) -> tuple[RobotProfile, RobotState, NavConstraint
 @given(situations(), st.sampled_from([None, AISLE]))
 def test_no_point_of_the_robot_is_commanded_above_the_limit(situation, boxes) -> None:
     robot, state, now = situation
-    speed, yaw_rate = SamplingPlanner(robot, boxes).plan(state, (8.0, 0.0), now, DT_S)
+    speed, yaw_rate = ReferencePlanner(robot, boxes).plan(state, (8.0, 0.0), now, DT_S)
     radius_m = robot.circumscribed_radius_m
     fastest_mps = speed + abs(yaw_rate) * radius_m
     if fastest_mps <= now.fastest_point_limit_mps + ROUNDING:
@@ -66,7 +67,7 @@ def test_no_point_of_the_robot_is_commanded_above_the_limit(situation, boxes) ->
 @given(situations(), st.sampled_from([None, AISLE]))
 def test_commands_keep_to_the_limits_of_the_profile(situation, boxes) -> None:
     robot, state, now = situation
-    speed, yaw_rate = SamplingPlanner(robot, boxes).plan(state, (8.0, 0.0), now, DT_S)
+    speed, yaw_rate = ReferencePlanner(robot, boxes).plan(state, (8.0, 0.0), now, DT_S)
     assert speed <= max(robot.max_speed_mps, state.speed_mps)
     assert speed - state.speed_mps <= robot.max_acceleration_mps2 * DT_S + ROUNDING
     assert state.speed_mps - speed <= robot.max_deceleration_mps2 * DT_S + ROUNDING
@@ -81,7 +82,7 @@ def test_commands_keep_to_the_limits_of_the_profile(situation, boxes) -> None:
 @pytest.mark.parametrize("robot", [NOVA_CARTER, SLUGGISH], ids=["Nova Carter", "sluggish"])
 def test_a_limited_robot_passes_somebody_who_stands_and_obeys_all_the_way(robot) -> None:
     """With 0.6 m/s for its fastest point a robot turns past a person and on to its goal."""
-    planner, state = SamplingPlanner(robot), RobotState(0.0, (0.0, 0.0), 0.0, 0.0, 0.0)
+    planner, state = CostmapPlanner(robot), RobotState(0.0, (0.0, 0.0), 0.0, 0.0, 0.0)
     now = constraints([((4.0, 0.1), (0.0, 0.0), 0.6)], 0.6, 0.6)
     fastest_mps = []
     while state.position_odom_m[0] < 7.5 and state.stamp_s < 40.0:
@@ -94,18 +95,7 @@ def test_a_limited_robot_passes_somebody_who_stands_and_obeys_all_the_way(robot)
     assert max(fastest_mps) > 0.55  # it uses what it may
 
 
-def test_the_shipped_robot_has_the_default_settings() -> None:
-    assert PlannerConfig.for_robot(NOVA_CARTER) == PlannerConfig()
-
-
-def test_settings_follow_the_robot() -> None:
-    config = PlannerConfig.for_robot(SLUGGISH)
-    assert config.max_yaw_rate_radps == 0.4
-    assert config.max_yaw_acceleration_radps2 == 0.8
-    # A turn costs as much per rad/s, or a slow turner would not face its goal.
-    usual = PlannerConfig()
-    assert config.smoothness_weight / 0.4 == pytest.approx(
-        usual.smoothness_weight / usual.max_yaw_rate_radps
-    )
+def test_a_robot_that_stops_slowly_looks_farther_ahead() -> None:
+    assert Sampling.of(NOVA_CARTER).horizon_s == 3.0
     heavy = replace(NOVA_CARTER, max_speed_mps=2.0, max_deceleration_mps2=0.8)
-    assert PlannerConfig.for_robot(heavy).horizon_s == pytest.approx(2.0 * 2.0 / 0.8)
+    assert Sampling.of(heavy).horizon_s == pytest.approx(2.0 * 2.0 / 0.8)

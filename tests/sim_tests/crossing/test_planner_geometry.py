@@ -1,4 +1,4 @@
-"""The mathematics of the reference planner, against quadrature and exact geometry."""
+"""The mathematics of the planners, against quadrature and exact geometry."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ import pytest
 import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from planner_scenes import HALF_LENGTH_M, HALF_WIDTH_M, OUTLINE_M, coordinate
+from planner_scenes import HALF_LENGTH_M, HALF_WIDTH_M, OUTLINE_M, ROBOT, coordinate
 from scipy.integrate import quad
 
+from sim_tests.crossing.planner._costmap import past_people
 from sim_tests.crossing.planner._geometry import (
+    Box,
+    FootprintBox,
     Poses,
     Rectangles,
     box_gap_m,
     disc_gap_m,
     ramp_integral,
     stopping_integral,
-    strip_distance_m,
 )
-from sim_tests.crossing.planner._scene import detour_bearing_rad
+from sim_tests.crossing.planner._scene import STANDING, Aim, Disc, Scene
 
 
 @given(
@@ -84,14 +86,12 @@ def test_the_box_gap_is_a_lower_bound_of_the_distance(
     assert float(box_gap_m(rectangles, [box])) <= polygon.distance(shapely.box(*box)) + 1e-9
 
 
-@given(coordinate, coordinate, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(0.0, 2.0))
-def test_the_strip_distance_is_the_distance_to_the_path_ahead(
-    x: float, y: float, vx: float, vy: float, ahead_s: float
-) -> None:
-    assume(math.hypot(vx, vy) * ahead_s > 1e-6)
-    path = shapely.LineString([(0.0, 0.0), (vx * ahead_s, vy * ahead_s)])
-    distance = strip_distance_m(*(np.asarray(value) for value in (x, y, vx, vy)), ahead_s)
-    assert float(distance) == pytest.approx(path.distance(shapely.Point(x, y)), abs=1e-5)
+def past(goal: Aim, disc: tuple[float, float, float], boxes: tuple[Box, ...] = ()) -> float:
+    """Return the bearing past a disc x, y, radius; the radius includes half the robot's width."""
+    x, y, radius = disc
+    margin_m = HALF_WIDTH_M + 0.15
+    scene = Scene(STANDING, (Disc(x, y, 0.0, 0.0, radius - margin_m),), boxes)
+    return past_people(goal, scene, FootprintBox.of(ROBOT)).bearing_rad
 
 
 @given(st.floats(-3, 3), st.floats(0.5, 5.0), st.floats(-math.pi, math.pi), st.floats(0.2, 2.0))
@@ -99,7 +99,7 @@ def test_a_detour_passes_a_disc_in_front_of_the_goal_on_the_nearer_side(
     goal_bearing: float, distance: float, bearing: float, radius: float
 ) -> None:
     disc = (distance * math.cos(bearing), distance * math.sin(bearing), radius)
-    chosen = detour_bearing_rad(goal_bearing, 6.0, [disc], lambda _x, _y: True)
+    chosen = past(Aim(6.0, goal_bearing), disc)
 
     def off_disc(angle: float) -> float:
         return abs(math.remainder(angle - bearing, math.tau))
@@ -115,9 +115,10 @@ def test_a_detour_passes_a_disc_in_front_of_the_goal_on_the_nearer_side(
 
 
 def test_a_detour_takes_the_free_side_and_none_if_both_are_blocked() -> None:
-    disc = (3.0, 0.0, 1.0)
+    disc, ahead = (3.0, 0.0, 1.0), Aim(6.0, 0.0)
     half_angle = math.asin(1.0 / 3.0)
-    assert detour_bearing_rad(0.0, 6.0, [disc], lambda _x, _y: True) == pytest.approx(-half_angle)
-    assert detour_bearing_rad(0.0, 6.0, [disc], lambda _x, y: y > 0) == pytest.approx(half_angle)
-    assert detour_bearing_rad(0.0, 6.0, [disc], lambda _x, _y: False) == 0.0
-    assert detour_bearing_rad(0.0, 2.5, [disc], lambda _x, _y: True) == 0.0  # the goal is nearer
+    right, left = (2.0, -2.0, 4.0, -0.9), (2.0, 0.9, 4.0, 2.0)
+    assert past(ahead, disc) == past(ahead, disc, (left,)) == pytest.approx(-half_angle)
+    assert past(ahead, disc, (right,)) == pytest.approx(half_angle)
+    assert past(ahead, disc, (left, right)) == 0.0
+    assert past(Aim(2.5, 0.0), disc) == 0.0  # the goal is nearer

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from planner_scenes import DT_S, ROBOT, at_rest, constraints
-from pydantic import ValidationError
 
 from sim_tests import Scenario, SimError, run_crossing
-from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
+from sim_tests.crossing.planner import ReferencePlanner
 
 EMPTY = Scenario.model_validate(
     {
@@ -55,20 +53,9 @@ def cross(planner):
 def test_unusable_arguments_are_refused_by_name(changed, name):
     given = {"goal": (8.0, 0.0), "dt_s": DT_S, "boxes": None, **changed}
     with pytest.raises(SimError, match=name):
-        SamplingPlanner(ROBOT, given["boxes"]).plan(
+        ReferencePlanner(ROBOT, given["boxes"]).plan(
             at_rest(), given["goal"], constraints([]), given["dt_s"]
         )
-
-
-def test_the_config_survives_yaml_and_refuses_what_cannot_drive(tmp_path: Path) -> None:
-    config = PlannerConfig(horizon_s=2.5, speed_samples=9)
-    config.to_yaml(tmp_path / "planner.yaml")
-    assert PlannerConfig.from_yaml(tmp_path / "planner.yaml") == config
-    with pytest.raises(ValidationError, match="did you mean 'horizon_s'"):
-        PlannerConfig.model_validate({"horizont_s": 2.0})
-    # With this weight a robot never turns to its goal.
-    with pytest.raises(ValidationError, match="heading_weight"):
-        PlannerConfig(heading_weight=0.05)
 
 
 @pytest.mark.parametrize(

@@ -137,9 +137,8 @@ def test_an_adapter_outside_slows_the_robot_and_the_frames_have_what_it_says(dom
 def test_a_stack_that_is_told_of_nobody_asks_nobody_to_look(domain) -> None:
     busy = "busy_in_aisle"
     asking = AwarenessPolicy.preset("balanced").model_copy(update={"attention": AttentionRules()})
-    # The reference planner goes round these people; the window alone passes near them.
-    window = "sim_tests.crossing.planner:SamplingPlanner"
-    near = run_crossing(busy, policy=asking, planner=window)
+    # The reference planner goes round these people; the one with a costmap passes near them.
+    near = run_crossing(busy, policy=asking, planner="costmap")
     assert any(each.constraints.alerts for each in near.frames)
     with Peer(domain):
         planner = f"ros2(domain={domain}, {LOCKSTEP}, limit='nobody')"

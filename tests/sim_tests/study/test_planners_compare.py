@@ -33,8 +33,7 @@ people:
     route: [{x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}]
     glances: {notices_within_m: 0.0}
 """
-WINDOW = "sim_tests.crossing.planner:SamplingPlanner"
-NAMES = ["straight_on", WINDOW, "run_planners:Raises", "run_planners:ReturnsNothing"]
+NAMES = ["straight_on", "costmap", "run_planners:Raises", "run_planners:ReturnsNothing"]
 
 
 def scene():
@@ -68,7 +67,7 @@ def test_every_planner_runs_with_blind_and_the_reference_planner_runs_too(folder
     ran = [(key.policy, key.planner) for key in read_jobs(folder)]
     for policy in ("blind", "balanced", "balanced, radii × 2"):
         planners = [planner for of, planner in ran if of == policy]
-        others = ["straight_on", "SamplingPlanner", "Raises", "ReturnsNothing"]
+        others = ["straight_on", "costmap", "Raises", "ReturnsNothing"]
         assert planners == ["ReferencePlanner", *others]
 
 
@@ -81,8 +80,8 @@ def test_obeying_and_using_radii_are_told_from_reading_nothing(tables, page):
     assert straight_on["Speed limit, m/s"] > 0.3
     assert straight_on["Episodes over"] == 1.0
     assert straight_on["× reference"] < 0.5
-    assert radii["SamplingPlanner"]["Radii"] == "uses them"
-    assert radii["SamplingPlanner"]["More distance, m"] > 0.1
+    assert radii["costmap"]["Radii"] == "uses them"
+    assert radii["costmap"]["More distance, m"] > 0.1
     assert radii["straight_on"]["Radii"] == "ignores them"
     assert radii["straight_on"]["Somebody near"] == 1.0
     assert radii["Raises"]["Radii"] == "–"

@@ -1,10 +1,10 @@
-"""A dynamic-window planner among moving people and fixed boxes, which follows an aim."""
+"""The dynamic window: it follows an aim among moving people and fixed boxes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -15,12 +15,26 @@ from nav_adapter.motion import clip_twists_ahead
 from perception.arrays import FloatArray, boxes_on_floor, finite_array, finite_number
 
 from ...world.errors import SimError
-from ._config import PlannerConfig
-from ._drives import Candidates, Drive, Sideways, Tick, TwistLimits, Wheels, along_time
+from ._drives import Candidates, Drive, Sideways, Tick, TwistLimits, Wheels
 from ._geometry import FootprintBox
-from ._scene import STANDING, Aim, Scene, Way, giving_way_mps, past_standing
-from ._standstill import REVERSE_MPS, Reversing, Waiting, goal_facing
+from ._reversing import REVERSE_MPS, Reversing
+from ._sampling import CLEARANCE_M, GOAL_TOLERANCE_M, Sampling, along_time
+from ._scene import STANDING, Aim, Scene
 
+# Costs have no dimension. One unit is the gain of driving straight to a far goal at the robot's
+# maximum speed over standing still. Facing away from the goal (by π) at the end of the roll-out
+# costs this much, touching a person or a box now, turning at 1.2 rad/s, and changing the yaw rate
+# by as much.
+_HEADING: Final = 0.3
+_PERSON: Final = 1.5
+_BOX: Final = 0.5
+_TURN: Final = 0.02
+_SMOOTHNESS: Final = 0.05
+# Weight of closeness to people at the end of the horizon, relative to closeness now. That of boxes
+# is 0: the robot will turn again before it is there.
+_LATE: Final = 0.3
+# Share of the robot's deceleration with which it arrives at the goal; the rest is in reserve.
+_GENTLE: Final = 0.6
 # Tolerance for rounding when a motion is compared with waiting.
 _SLACK_M: Final = 1e-5
 # Costs closer than this are equal; the order of the samples then decides, not the rounding.
@@ -33,21 +47,21 @@ _STANDING_MPS: Final = 0.02
 _Cost = Callable[[Tick, Candidates], FloatArray]
 
 
-class SamplingPlanner:
-    """A dynamic-window planner (Fox, Burgard and Thrun 1997) for every drive of a profile.
+class DynamicWindow:
+    """A dynamic window (Fox, Burgard and Thrun 1997) for every drive of a profile.
 
-    It drives to a goal among moving people and fixed boxes. A candidate is a final speed after a
-    turn that is held for a while, on a curve that the robot can drive; of a holonomic robot it is a
-    velocity in one direction. Each is rolled out in closed form and judged twice:
+    It drives to an aim among moving people and fixed boxes; by itself it goes straight to the goal.
+    A candidate is a final speed after a turn that is held for a while, on a curve that the robot
+    can drive; of a holonomic robot it is a velocity in one direction. Each is rolled out in closed
+    form and judged twice:
 
-    * It must be *safe*: one tick of it followed by full braking keeps ``clearance_m`` to every box
-      and, until the robot stands, to every person's disc moving on at constant velocity. Where that
-      gap is already gone, because a radius grew or a person walked up, motion that leaves at least
-      the gap that waiting would leave is safe too, so that the robot can get out. A moving robot
-      keeps enough distance ahead to turn on the spot; near people a standing robot always may.
-    * It should be *good*: near the goal soon, facing it, away from people, boxes and the strip that
-      a walking person is about to use, at a distance from people's bodies, without needless
-      turning. If someone stands in front of the goal, the robot heads for the tangent past them.
+    * It must be *safe*: one tick of it followed by full braking keeps 0.05 m to every box and,
+      until the robot stands, to every person's disc moving on at constant velocity. Where that gap
+      is already gone, because a radius grew or a person walked up, motion that leaves at least the
+      gap that waiting would leave is safe too, so that the robot can get out. A moving robot keeps
+      enough distance ahead to turn on the spot; near people a standing robot always may.
+    * It should be *good*: near the aim soon, facing it, away from people and boxes, without
+      needless turning.
 
     If nothing is safe the robot brakes as hard as it may along its present curve. Only a robot that
     steers reverses, at 0.3 m/s and less, out of a place where no arc ahead is free of boxes, or
@@ -57,41 +71,35 @@ class SamplingPlanner:
     Args:
         robot: footprint and limits. The footprint counts with its bounding rectangle.
         static_boxes_odom_m: (N, 4) fixed obstacles x_min, y_min, x_max, y_max; None for none.
-        config: sampling and preferences; None for :meth:`PlannerConfig.for_robot`.
+
+    Attributes:
+        person_comfort_m: gap to a person's radius below which closeness costs.
+        box_comfort_m: the same of a box.
 
     Raises:
         SimError: if the boxes are not finite or a minimum is not below its maximum.
     """
 
-    def __init__(
-        self,
-        robot: RobotProfile,
-        static_boxes_odom_m: ArrayLike | None = None,
-        config: PlannerConfig | None = None,
-    ) -> None:
+    person_comfort_m = 0.40
+    box_comfort_m = 0.25
+
+    def __init__(self, robot: RobotProfile, static_boxes_odom_m: ArrayLike | None = None) -> None:
         self.robot = robot
-        self.config = config = config if config is not None else PlannerConfig.for_robot(robot)
+        self._sampling = sampling = Sampling.of(robot)
         self._footprint = FootprintBox.of(robot)
         boxes = np.zeros((0, 4)) if static_boxes_odom_m is None else static_boxes_odom_m
         checked = boxes_on_floor("static_boxes_odom_m", boxes, SimError)
         self._boxes_odom_m = tuple(map(tuple, checked.tolist()))
 
-        samples = max(2, math.ceil(config.horizon_s / config.step_s))
-        self._t_s = along_time(config.horizon_s / samples, config.horizon_s, samples)
-        self._late_people = along_time(1.0, config.late_weight, samples)
-        self._late_static = along_time(1.0, config.late_static_weight, samples)
-        self._wheels = None if robot.drive == "holonomic" else Wheels(robot, config)
-        self._drive: Drive = self._wheels or Sideways(robot, config)
+        self._t_s = sampling.times_s
+        self._late_people = along_time(1.0, _LATE, len(self._t_s))
+        self._late_boxes = along_time(1.0, 0.0, len(self._t_s))
+        self._wheels = None if robot.drive == "holonomic" else Wheels(robot, sampling)
+        self._drive: Drive = self._wheels or Sideways(robot, sampling)
         self._turns_on_the_spot = robot.drive in (None, "differential")
-        self._waiting = Waiting()
         self._reversing: Reversing | None = None
         if robot.min_turning_radius_m is not None:
-            self._reversing = Reversing(
-                robot.min_turning_radius_m,
-                self._footprint,
-                config.clearance_m,
-                config.goal_tolerance_m,
-            )
+            self._reversing = Reversing(robot.min_turning_radius_m, self._footprint)
 
     def plan(
         self,
@@ -117,35 +125,34 @@ class SamplingPlanner:
         """
         goal_odom_m = finite_array("goal_odom_m", goal_odom_m, (2,), SimError)
         dt_s = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
-        config = self.config
         goal = Aim.at(goal_odom_m, robot_state)
-        limits = TwistLimits.of(self.robot, config, constraints)
-        if limits.speed_mps <= 0.0 or goal.distance_m <= config.goal_tolerance_m:
+        limits = self._limits(constraints)
+        if limits.speed_mps <= 0.0 or goal.distance_m <= GOAL_TOLERANCE_M:
             return self._drive.brake(robot_state, dt_s)
         scene = Scene.around(robot_state, constraints, self._boxes_odom_m)
-        aim = past_standing(
-            goal,
-            scene,
-            self._footprint,
-            clearance_m=config.clearance_m,
-            margin_m=config.detour_margin_m,
-            standing_mps=config.standing_speed_mps,
-        )
         top_mps = self._top_mps(limits, goal)
-        if scene.people and config.give_way_s > 0.0:
-            top_mps = giving_way_mps(
-                self._way(aim),
-                scene.people,
-                top_mps,
-                crossing_mps=config.crossing_speed_mps,
-                within_s=config.give_way_s,
-            )
-        command = self._command(Tick(robot_state, limits, top_mps, aim, dt_s, scene), goal)
-        return within_next_limits(command, robot_state, constraints, dt_s)
+        tick = Tick(robot_state, limits, top_mps, self._aim(goal, scene), dt_s, scene)
+        return within_next_limits(self._command(tick, goal), robot_state, constraints, dt_s)
+
+    def _aim(self, goal: Aim, scene: Scene) -> Aim:
+        """Return the place to head for on the way to the goal."""
+        return goal
+
+    def _limits(self, constraints: NavConstraints) -> TwistLimits:
+        """Return the twists that the robot may have now."""
+        assert constraints.fastest_point_limit_mps is not None
+        robot = self.robot
+        return TwistLimits(
+            min(constraints.speed_limit_mps, robot.max_speed_mps),
+            constraints.fastest_point_limit_mps,
+            self._sampling.yaw_rate_radps,
+            robot.circumscribed_radius_m,
+            math.inf if robot.min_turning_radius_m is None else 1.0 / robot.min_turning_radius_m,
+        )
 
     def _top_mps(self, limits: TwistLimits, goal: Aim) -> float:
         """Return the highest speed from which the robot arrives gently."""
-        gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
+        gentle_mps2 = _GENTLE * self.robot.max_deceleration_mps2
         return min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal.distance_m))
 
     def _command(self, tick: Tick, goal: Aim) -> tuple[float, ...]:
@@ -154,12 +161,10 @@ class SamplingPlanner:
         if reversing is not None and self._wheels is not None and reversing.wanted(tick):
             back = tick._replace(top_mps=min(REVERSE_MPS, tick.limits.speed_mps))
             return self._cheapest_safe(back, self._wheels.backward(back), self._backing_cost)
-        command = self._choose(tick, self.config.room_weight)
-        if self._waiting.goes_on(tick, command):
-            command = self._choose(tick, 0.0)
+        command = self._choose(tick)
         if reversing is not None and reversing.has_stood(tick, command):
-            alone = tick._replace(scene=tick.scene.without_people())
-            if self._choose(alone, self.config.room_weight)[0] <= _STANDING_MPS:
+            alone = tick._replace(scene=replace(tick.scene, people=()))
+            if self._choose(alone)[0] <= _STANDING_MPS:
                 reversing.begin()  # not people, but boxes are in the way
         if (
             self._turns_on_the_spot
@@ -173,10 +178,9 @@ class SamplingPlanner:
             return self._cheapest_safe(turn, self._drive.candidates(turn), self._goal_cost)
         return command
 
-    def _choose(self, tick: Tick, room_weight: float) -> tuple[float, ...]:
+    def _choose(self, tick: Tick) -> tuple[float, ...]:
         """Return the command of the best candidate that is safe, or full braking."""
-        cost = partial(self._cost, room_weight=room_weight)
-        return self._cheapest_safe(tick, self._drive.candidates(tick), cost)
+        return self._cheapest_safe(tick, self._drive.candidates(tick), self._cost)
 
     def _cheapest_safe(
         self, tick: Tick, candidates: Candidates, cost_of: _Cost
@@ -190,109 +194,79 @@ class SamplingPlanner:
         row, column = divmod(int(np.argmax(cost <= cost.min() + _TIE)), cost.shape[1])
         return tuple(candidates.commands[row, column].tolist())
 
-    def _way(self, aim: Aim) -> Way:
-        """Return the strip in which the robot drives to its aim."""
-        box = self._footprint
-        return Way(
-            aim.bearing_rad,
-            aim.distance_m,
-            box.half_size_m[1] + self.config.clearance_m,
-            box.center_m[0] + box.half_size_m[0],
-            box.half_size_m[0] - box.center_m[0],
-        )
-
     def _safe(self, tick: Tick, candidates: Candidates) -> NDArray[np.bool_]:
         """Return (V, W) whether one tick of a command and then full braking keep the clearance."""
         commands, index = candidates.distinct()
         safe = np.ones((1, len(commands)), dtype=bool)
-        if len(commands):
-            poses, t_s = self._drive.stopping(commands, tick)
-            # A robot that never reverses must not drive to where it cannot turn on the spot.
-            turning_m = self._footprint.turning_margin_m if self._turns_on_the_spot else 0.0
-            margin_m = np.where(commands[None, :, 0] > 0.0, turning_m, 0.0)
-            moving = self._footprint.at(poses, margin_m)
-            clearance_m = self.config.clearance_m
-            near_m = self._footprint.reach_m + turning_m + clearance_m
-            scene = tick.scene.near(poses, near_m, float(t_s[-1].max()))
-            if scene.people:
-                # The present gap to people is measured without this margin: else it could be used
-                # up.
-                still = self._footprint.at(STANDING)
-                enough = np.minimum(clearance_m, scene.people_gap_m(still, t_s) - _SLACK_M)
-                safe &= (scene.people_gap_m(moving, t_s) >= enough).all(axis=(0, 1))
-                # Turning on the spot is always allowed: the corners stay within the turning circle
-                # and the speed limit.
-                safe |= (commands[None, :, :-1] == 0.0).all(axis=-1)
-            if scene.boxes_odom_m:
-                waiting = self._footprint.at(STANDING, margin_m)
-                enough = np.minimum(clearance_m, scene.box_gap_m(waiting) - _SLACK_M)
-                safe &= (scene.box_gap_m(moving) >= enough).all(axis=0)
-        return np.asarray(np.append(safe.ravel(), False)[index])
+        poses, t_s = self._drive.stopping(commands, tick)
+        # A robot that never reverses must not drive to where it cannot turn on the spot.
+        turning_m = self._footprint.turning_margin_m if self._turns_on_the_spot else 0.0
+        margin_m = np.where(commands[None, :, 0] > 0.0, turning_m, 0.0)
+        moving = self._footprint.at(poses, margin_m)
+        near_m = self._footprint.reach_m + turning_m + CLEARANCE_M
+        scene = tick.scene.near(poses, near_m, float(t_s[-1].max()))
+        if scene.people:
+            # The present gap to people is measured without this margin: else it could be used up.
+            still = self._footprint.at(STANDING)
+            enough = np.minimum(CLEARANCE_M, scene.people_gap_m(still, t_s) - _SLACK_M)
+            safe &= (scene.people_gap_m(moving, t_s) >= enough).all(axis=(0, 1))
+            # Turning on the spot is always allowed: the corners stay within the turning circle and
+            # the speed limit.
+            safe |= (commands[None, :, :-1] == 0.0).all(axis=-1)
+        if scene.boxes_odom_m:
+            waiting = self._footprint.at(STANDING, margin_m)
+            enough = np.minimum(CLEARANCE_M, scene.box_gap_m(waiting) - _SLACK_M)
+            safe &= (scene.box_gap_m(moving) >= enough).all(axis=0)
+        return np.asarray(safe[0, index] & candidates.allowed)
 
-    def _cost(self, tick: Tick, candidates: Candidates, room_weight: float) -> FloatArray:
+    def _cost(self, tick: Tick, candidates: Candidates) -> FloatArray:
         """Return the cost (V, W) of each candidate over the horizon, dimensionless."""
-        config, t_s = self.config, self._t_s
-        poses, turning = candidates.poses, candidates.turning
+        poses, turning, t_s = candidates.poses, candidates.turning, self._t_s
         cost = self._goal_cost(tick, candidates)
         change = turning - candidates.turning_now
-        cost += config.turn_weight * turning**2 + config.smoothness_weight * np.abs(change)
+        cost += _TURN * turning**2 + _SMOOTHNESS * np.abs(change)
         rectangles = self._footprint.at(poses)
         # Whoever stays farther away than any comfort has no cost.
-        comfort_m = max(config.person_comfort_m, config.room_m, config.static_comfort_m)
-        near_m = self._footprint.reach_m + comfort_m
-        scene = tick.scene.near(poses, near_m, config.horizon_s + config.front_time_s)
+        near_m = self._footprint.reach_m + max(self.person_comfort_m, self.box_comfort_m)
+        scene = tick.scene.near(poses, near_m, self._sampling.horizon_s)
         if scene.people:
-            close = _closeness(scene.people_gap_m(rectangles, t_s), config.person_comfort_m)
-            strip_gap = scene.strip_gap_m(rectangles, t_s, config.front_time_s)
-            ahead = _closeness(strip_gap, config.person_comfort_m)
-            worst = config.person_weight * close + config.front_weight * ahead
-            weighted = worst * self._late_people
+            close = _closeness(scene.people_gap_m(rectangles, t_s), self.person_comfort_m)
+            weighted = _PERSON * close * self._late_people
             # The worst moment decides; the mean leads a robot inside a disc out of it.
             cost += (weighted.max(axis=1) + weighted.sum(axis=1) / len(t_s)).sum(axis=0)
-            bodies = scene.standing(config.standing_speed_mps, rectangles.half_width_m)
-            if bodies.people:
-                gaps_m = bodies.people_gap_m(rectangles, t_s)
-                near = (_closeness(gaps_m, config.room_m).sum(axis=1) / len(t_s)).max(axis=0)
-                # Compares yaw rates at equal speed only: the speed limit slows the robot already.
-                cost += room_weight * (near - near.min(axis=1, keepdims=True))
-        if tick.scene.people:
-            cost += config.keep_right_weight * np.maximum(turning, 0.0)
         if scene.boxes_odom_m:
-            close = _closeness(scene.box_gap_m(rectangles), config.static_comfort_m)
-            worst_box = (close * self._late_static).max(axis=0)
+            close = _closeness(scene.box_gap_m(rectangles), self.box_comfort_m)
+            worst_box = (close * self._late_boxes).max(axis=0)
             if abs(tick.state.speed_mps) < _STANDING_MPS:
                 # A turn on the spot leads out: the swing of its corners costs nothing.
                 now = scene.box_gap_m(self._footprint.at(STANDING))
-                worst_box[0] = _closeness(now, config.static_comfort_m)
-            cost += config.static_weight * worst_box
+                worst_box[0] = _closeness(now, self.box_comfort_m)
+            cost += _BOX * worst_box
         return cost
 
     def _goal_cost(self, tick: Tick, candidates: Candidates) -> FloatArray:
         """Return the cost (V, W) of mean distance to the goal and of going away from it."""
-        poses, aim = candidates.poses, tick.aim
-        to_x = aim.distance_m * math.cos(aim.bearing_rad) - poses.x_m
-        to_y = aim.distance_m * math.sin(aim.bearing_rad) - poses.y_m
+        aim = tick.aim
+        to_x, to_y = aim.from_poses_m(candidates.poses)
         distance = np.sqrt(to_x * to_x + to_y * to_y)
-        full_gain_m = 0.5 * self.robot.max_speed_mps * self.config.horizon_s
+        full_gain_m = 0.5 * self.robot.max_speed_mps * self._sampling.horizon_s
         farther_m = distance.sum(axis=0) / len(distance) - aim.distance_m
-        c, s = candidates.course
-        off_rad = np.arctan2(to_y[-1] * c - to_x[-1] * s, to_x[-1] * c + to_y[-1] * s)
         # At the goal there is no direction to face.
-        away = np.minimum(distance[-1] / self.config.goal_tolerance_m, 1.0)
-        weight = self.config.heading_weight / math.pi
+        away = np.minimum(distance[-1] / GOAL_TOLERANCE_M, 1.0)
+        weight = _HEADING / math.pi
         if self._reversing is not None and abs(aim.bearing_rad) > _BEHIND_RAD:
             weight *= _TURN_BACK  # its turn leads away from the goal at first
-        facing = weight * np.abs(off_rad) * away
+        facing = weight * candidates.off_rad(to_x, to_y) * away
         return np.asarray(farther_m / full_gain_m + facing)
 
     def _backing_cost(self, tick: Tick, candidates: Candidates) -> FloatArray:
         """Return the cost (V, W) of motions backward: those that turn most to the goal are best."""
-        cost = goal_facing(candidates.poses, tick.aim)
-        comfort_m = self.config.static_comfort_m
-        scene = tick.scene.near(candidates.poses, self._footprint.reach_m + comfort_m, 0.0)
+        cost = candidates.off_rad(*tick.aim.from_poses_m(candidates.poses))
+        near_m = self._footprint.reach_m + self.box_comfort_m
+        scene = tick.scene.near(candidates.poses, near_m, 0.0)
         if scene.boxes_odom_m:
             gaps_m = scene.box_gap_m(self._footprint.at(candidates.poses))
-            cost = cost + _closeness(gaps_m, comfort_m).max(axis=0)
+            cost = cost + _closeness(gaps_m, self.box_comfort_m).max(axis=0)
         cost[0] += math.tau  # rather slowly than not at all
         return cost
 
