@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -13,40 +12,25 @@ from nav_adapter import RobotProfile
 from perception.arrays import FloatArray
 
 from ..actors.robot import NOVA_CARTER, RobotModel
-from ._scenario import Scenario
+
+if TYPE_CHECKING:
+    from ._scenario import Scenario
 
 # Share of the longer reach that becomes room beside the lane: a long robot swings its ends out.
 _SWING_SHARE: Final = 0.5
 
 
-def scenario_for_robot(
-    scenario: Scenario, robot: RobotModel | RobotProfile | str | Path
-) -> Scenario:
-    """Return a scenario for another robot than the one that it was made for, the Nova Carter.
+def fitted(scenario: Scenario, model: RobotModel) -> Scenario:
+    """Return a scenario, made for the Nova Carter, for another robot; see :class:`Scenario`.
 
-    *Room.* The lane, the aisle along it, and everything beside the line from start to goal, which
-    may lie at any angle, move outward by what the robot is
-    wider, and by half of what it reaches farther from its base. Places within the aisle are
-    stretched; racks and people's routes beyond it are shifted. Pauses and turns stay at the same
-    place of the route. The hall is longer by what the robot is longer.
-
-    *Time.* The duration grows with the time that the way takes at the robot's speed and
-    acceleration. People start later by what the robot takes longer for half of the way, so that
-    they still meet; those who set off as it comes let a slower robot come nearer, as near in time.
-    Smaller and faster robots change neither. Recorded people (``replay_csv``) stay
-    as they were recorded, in place and in time.
-
-    The name becomes ``scenario_robot``, such as ``blind_corner_forklift``.
-
-    Args:
-        scenario: the scenario. One that has a robot already is returned as it is, if it is the
-            same.
-        robot: a model, a shipped name, a YAML file, or a profile.
+    Places within the aisle are stretched; racks and people's routes beyond it are shifted. Pauses
+    and turns stay at the same place of the route. The hall is longer by what the robot is longer.
+    People start later by what the robot takes longer for half of the way; those who set off as it
+    comes let a slower robot come nearer, as near in time. Smaller and faster robots change neither.
 
     Raises:
-        SimError: for an unknown robot, or a scenario that has another robot already.
+        SimError: the scenario has another robot already.
     """
-    model = RobotModel.of(robot)
     if scenario.robot_model is not None:
         if scenario.robot_model == model:
             return scenario
@@ -68,7 +52,7 @@ def scenario_for_robot(
     _let_nearer(data, min(slower.max_speed_mps / usual.max_speed_mps, 1.0))
     data |= {"name": f"{scenario.name}_{model.name}", "robot_model": model}
     data["scanners"] = model.scanners
-    return Scenario.from_data(data, scenario.name)
+    return scenario.model_validate(data)
 
 
 def _drive_s(robot: RobotProfile, way_m: float) -> float:

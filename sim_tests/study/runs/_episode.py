@@ -18,7 +18,7 @@ from ...crossing.planner import is_outside
 from ...scenario import Scenario
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, measure, path_length_m
-from ._plan import fault_of, policy_of, template_of
+from ._plan import fault_of, policy_of, scenario_of
 from ._run_files import Attempt, Job
 
 # Seed of the planner in the task without people, the same for every episode of the task.
@@ -104,7 +104,7 @@ def observed_episode(
 
     ``free`` is its task without people; None drives that too.
     """
-    template = template_of(job.scenario_text)
+    scenario = scenario_of(job.scenario_text)
     # Before the episode: what a planner imports only while it drives is then there.
     free = free_run_of(job) if free is None else free
     result = drive(setup_of(job), observer)
@@ -112,8 +112,8 @@ def observed_episode(
         result,
         time_without_people_s=free.time_s,
         length_without_people_m=free.length_m,
-        scenario_version=template.version,
-        attention=template.attention,
+        scenario_version=scenario.version,
+        attention=scenario.attention,
         nondeterministic=not free.repeats,
         **asdict(job.conditions),
     )
@@ -124,7 +124,7 @@ def setup_of(job: Job) -> Setup:
     """Return the episode of a job; raise SimError for a job that cannot be read."""
     return Setup(
         conditions=job.conditions,
-        scenario=template_of(job.scenario_text).for_seed(job.seed),
+        scenario=scenario_of(job.scenario_text).draw(job.seed),
         policy=policy_of(job.policy_text),
         planner=job.planner_text,
         fault=fault_of(job.fault_text),
@@ -134,10 +134,10 @@ def setup_of(job: Job) -> Setup:
 def task_of(job: Job) -> tuple[str, int, str]:
     """Return the key of a job's task without people: jobs with the same key share it."""
     try:
-        parameters = template_of(job.scenario_text).parameters()
+        distributions = scenario_of(job.scenario_text).distributions
     except SimError:  # each of its episodes says it
-        parameters = {}
-    varies = any(path.startswith("robot.") for path in parameters)
+        distributions = {}
+    varies = any(path.startswith("robot.") for path in distributions)
     return job.scenario_text, job.seed if varies else 0, job.planner_text
 
 
@@ -149,14 +149,14 @@ def people_in(job: Job) -> int:
 @lru_cache(maxsize=256)
 def _people_in(scenario_text: str) -> int:
     try:
-        return len(template_of(scenario_text).median().people)
+        return len(scenario_of(scenario_text).people)
     except SimError:  # its episodes say it
         return 0
 
 
 def free_run_of(job: Job) -> FreeRun:
     """Return the figures of a job's task without people; unknown for a robot without a planner."""
-    scenario = template_of(job.scenario_text).for_seed(job.seed)
+    scenario = scenario_of(job.scenario_text).draw(job.seed)
     if not job.planner_text and scenario.robot.straight_on_speed_mps is not None:
         return FreeRun(None, None, repeats=True)
     return _free_run(scenario.without_people().model_dump_json(), job.planner_text)
@@ -180,10 +180,10 @@ def failed(job: Job, error: str, traceback: str = "") -> Attempt:
     line = " ".join(error.replace("\0", "").splitlines())[:500]
     record = EpisodeRecord(**asdict(job.conditions), error=line)
     try:
-        template = template_of(job.scenario_text)
+        scenario = scenario_of(job.scenario_text)
     except SimError:  # the scenario cannot be read
         return Attempt(record, traceback)
-    about = {"scenario_version": template.version, "attention": template.attention}
+    about = {"scenario_version": scenario.version, "attention": scenario.attention}
     return Attempt(replace(record, **about), traceback)
 
 

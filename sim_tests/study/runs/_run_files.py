@@ -30,7 +30,7 @@ class Job(Conditions):
     even if the files change in the meantime. Each line of ``jobs.jsonl`` has these fields.
 
     Attributes:
-        scenario_text: YAML of a :class:`ScenarioTemplate`, with the camera, the robot and the
+        scenario_text: YAML of a :class:`Scenario`, with the camera, the robot and the
             population.
         policy_text: YAML of an :class:`AwarenessPolicy`.
         planner_text: ``"module:Class"``, empty for the reference planner.
