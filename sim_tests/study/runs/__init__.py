@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ._replay import box_scale_of, find_episode, recorder_of, replay_command
     from ._run import held, run_jobs, terminated_as_interrupted
     from ._run_files import (
+        Attempt,
         Job,
         RunFiles,
         answering_note,

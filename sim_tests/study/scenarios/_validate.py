@@ -21,7 +21,7 @@ from ...scenario.catalogue import (
     names_of_sets,
 )
 from ...world.errors import MissingSimulatorError, SimError
-from ..measures import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNAWARE_UP_TO, MeasuredAttention, Trace
+from ..measures import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNAWARE_UP_TO, MeasuredAttention
 
 if TYPE_CHECKING:
     from ...crossing import CrossingResult
@@ -127,7 +127,7 @@ class AttentionCheck:
     @classmethod
     def of(cls, scenario: Scenario, results: Iterable[CrossingResult]) -> AttentionCheck:
         """Return the check of a scenario by crossings of it."""
-        measured = [MeasuredAttention.of(Trace.of(result)) for result in results]
+        measured = [MeasuredAttention.of(result) for result in results]
         names = _names(scenario, measured)
         return cls(scenario.attention, len(measured), _people(names, measured))
 

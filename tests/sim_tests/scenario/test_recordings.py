@@ -17,7 +17,6 @@ from sim_tests.scenario.catalogue import drawn_problems
 from sim_tests.scenario.recordings import RecordingOptions, read_table, scenario_from_recording
 from sim_tests.study.report._write import recorded_people
 from sim_tests.study.runs import plan_jobs
-from sim_tests.study.social import EpisodeRecorder
 
 CLIPS = sorted((SHARED / "data").glob("citr_*.csv"))
 Place = Callable[[float], tuple[float, float]]
@@ -228,13 +227,12 @@ def crossed(
     out: Path,
     options: RecordingOptions,
     duration_s: float | None = None,
-    observer: EpisodeRecorder | None = None,
 ) -> CrossingResult:
     made = scenario_from_recording(table, out, options)
     scenario = Scenario.from_yaml(made.scenario)
     if duration_s is not None:
         scenario = scenario.model_copy(update={"duration_s": duration_s})
-    return run_crossing(scenario, policy="balanced", observer=observer)
+    return run_crossing(scenario, policy="balanced")
 
 
 def off_path_m(result: CrossingResult, people: Path) -> np.ndarray:
@@ -276,12 +274,10 @@ def test_people_walk_into_a_robot_or_round_it(tmp_path: Path) -> None:
 def test_people_who_left_are_not_measured(tmp_path: Path) -> None:
     people: dict[str, Place] = {"agv": robot, "b": along}
     table = written(tmp_path / "leaves.csv", people)
-    recorder = EpisodeRecorder()
     options = RecordingOptions(robot_id="agv", until_s=101.0)
-    result = crossed(table, tmp_path / "leaves.yaml", options, 2.0, recorder)
-    episode = recorder.episode(result)
-    there = ~np.isnan(episode.people_m[:, 0]).any(axis=1)
-    np.testing.assert_array_equal(there, episode.t_s < 1.01)
+    result = crossed(table, tmp_path / "leaves.yaml", options, 2.0)
+    there = ~np.isnan(result.people_odom_m[:, 0]).any(axis=1)
+    np.testing.assert_array_equal(there, result.t_s < 1.01)
 
 
 @pytest.mark.skipif(

@@ -225,7 +225,7 @@ def test_attentive_and_distracted_differ_only_in_the_gaze():
     assert other.glances.notices_within_m == 0.0
 
 
-def test_a_crossing_run_by_name_is_drawn_by_its_seed():
+def test_a_crossing_is_drawn_by_its_seed():
     def first(scenario):
         seen = []
 
@@ -237,9 +237,19 @@ def test_a_crossing_run_by_name_is_drawn_by_its_seed():
             run_crossing(scenario, policy="assertive", seed=2, observer=look)
         return seen[0]
 
-    drawn = Scenario.shipped("standing_in_aisle").draw(2)
-    by_name, given = first("standing_in_aisle"), first(drawn)
-    place = by_name.truth[0].position_odom_m
-    assert place.tobytes() == given.truth[0].position_odom_m.tobytes()
-    assert place == pytest.approx([drawn.people[0].route[0].x_m, drawn.people[0].route[0].y_m])
-    assert by_name.robot_state.position_odom_m[0] == pytest.approx(drawn.robot.start_x_m, abs=1e-9)
+    written = Scenario.shipped("standing_in_aisle")
+    drawn = written.draw(2)
+    place = [drawn.people[0].route[0].x_m, drawn.people[0].route[0].y_m]
+    for scenario in ("standing_in_aisle", written, drawn):
+        frame = first(scenario)
+        assert frame.truth[0].position_odom_m == pytest.approx(place)
+        start_m = frame.robot_state.position_odom_m[0]
+        assert start_m == pytest.approx(drawn.robot.start_x_m, abs=1e-9)
+
+
+def test_a_copy_with_other_values_keeps_the_medians():
+    written = varied()
+    copied = written.model_copy(update={"duration_s": 5.0})
+    assert copied.draw(3) is copied
+    assert copied.people == written.people
+    assert copied.model_copy(update={"duration_s": 20.0}) == written.with_values({}) != written

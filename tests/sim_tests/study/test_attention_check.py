@@ -12,7 +12,7 @@ from measured_scenes import crossing
 
 from awarenav.cli import main
 from sim_tests import Scenario, run_crossing, shipped_scenarios
-from sim_tests.study.measures import MeasuredAttention, Trace
+from sim_tests.study.measures import MeasuredAttention
 from sim_tests.study.scenarios._validate import AttentionCheck, check_attention
 
 T_S = np.arange(0.0, 10.05, 0.1)
@@ -44,7 +44,7 @@ def seen(result, could_look):
 def measured(people, looks, could_look=lambda t, person: True):
     walks = [person_at(x) for x in people]
     result = seen(crossing(T_S, still, walks, looks=looks), could_look)
-    return MeasuredAttention.of(Trace.of(result))
+    return MeasuredAttention.of(result)
 
 
 def test_only_the_time_counts_in_which_looking_matters():
