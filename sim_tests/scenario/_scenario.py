@@ -33,7 +33,7 @@ from ..world.hall import LAYOUTS, WarehouseLayout
 from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._distributions import Distribution, error_text, find_parameters, with_numbers
 from ._files import camera_data, parse_yaml, read_file, require_version, shipped_text
-from ._for_robot import fitted
+from ._for_robot import fit
 from ._networks import networks_data
 
 # The key of a robot to which the scenario is fitted.
@@ -321,11 +321,24 @@ class Scenario(SimConfig):
         model = None if robot is None else _robot_of(robot, source)
         try:
             scenario = cls.model_validate({k: data[k] for k in data if k != _FOR_ROBOT})
-            scenario = scenario if model is None else fitted(scenario, model)
+            if model is not None:
+                scenario = scenario._fitted_to(model)
         except ValidationError as cause:
             raise SimError(f"{source}: {error_text(cause)}") from cause
         scenario._written = data
         return scenario
+
+    def _fitted_to(self, model: RobotModel) -> Scenario:
+        own = self.robot_model
+        if own is not None and own != model:
+            raise SimError(
+                f"scenario {self.name!r} is for the robot {own.name!r} already, got {model.name!r}"
+            )
+        if own is not None or model.body == "nova_carter":
+            return self
+        data = self.model_dump()
+        fit(data, model)
+        return self.model_validate(data)
 
     @property
     def id(self) -> str:
