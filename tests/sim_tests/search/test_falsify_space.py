@@ -191,11 +191,11 @@ def test_how_people_answer_is_a_lever_where_the_robot_asks(name):
         ({answers: 0.9, delay: 1.5}, {"answers": 1.0, "delay_median_s": 1.5, "delay_spread": 1.0}),
         ({into: 0.8}, {"startles": 1.0, "startles_into_path": 1.0}),
     ):
-        scenario = space.scenario({**space.neutral, **values})
-        first, *others = scenario.people
+        asked = space.scenario({**space.neutral, **values})
+        first, *others = asked.people
         assert first.hearing == Hearing().model_copy(update=changes)
         assert [each.hearing for each in others] == [None] * len(others)
-        assert scenario.hearing == Hearing()
+        assert asked.hearing == Hearing()
     other = ScenarioSpace(scenario.with_population("phone_factor=0.2"), asks=True)
     (first, *_) = other.scenario({**other.neutral, into: 0.8}).people
     assert first.hearing.phone_factor == 0.2
