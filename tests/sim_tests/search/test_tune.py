@@ -226,7 +226,9 @@ def tune_settings(**changes) -> TuneSettings:
 def test_the_episodes_of_a_tuning_have_its_perception(name):
     balanced = AwarenessPolicy.preset("balanced")
     settings = tune_settings(perception=name)
-    jobs = settings.jobs("b", balanced, range(7, 9), settings.tuning_scenarios[:3])
+    jobs = settings.jobs(
+        "b", balanced, range(7, 9), [*map(Scenario.shipped, shipped_scenarios()[:3])]
+    )
     assert len(jobs) == 6
     assert {(job.perception, job.policy) for job in jobs} == {(name, "b")}
     assert sorted({job.seed for job in jobs}) == [7, 8]
