@@ -107,12 +107,6 @@ def test_a_face_cut_off_by_the_border_does_not_count_as_turned_away(person, seen
     assert std < 0.05
 
 
-def test_the_head_estimators_probability_comes_before_the_scores():
-    head = head_at(seen=0.05)
-    assert judge_face(CAMERA, ALL, head, 0.3).seen == pytest.approx(0.05)
-    assert judge_face(CAMERA, with_scores(), head_at(seen=0.9), 0.3).seen == pytest.approx(0.9)
-
-
 def test_an_unknown_direction_is_evidence_of_the_back_of_a_head_only():
     """15° bound what a network may say of a face; keypoints without a network have no bound."""
     sure, unsure = (head_at(std_rad=math.radians(deg), seen=0.9) for deg in (14.9, 15.1))

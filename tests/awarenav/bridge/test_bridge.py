@@ -282,13 +282,13 @@ def test_bad_input_is_refused_in_a_line(
     assert said.splitlines()[-1].startswith("awarenav bridge: ")
 
 
-@pytest.mark.parametrize("bad", ["field_of_view_deg: [90, -90]", "yaw_deg: 200", "height_m: 0.2"])
-def test_a_robot_file_with_a_wrong_scanner_is_refused(bad: str, tmp_path: Path, capsys) -> None:
+def test_a_robot_file_with_a_wrong_scanner_is_refused(tmp_path: Path, capsys) -> None:
     path = tmp_path / "robot.yaml"
-    scanner = f"scanners:\n  - position_base_m: [0.3, 0.0, 0.2]\n    {bad}\n"
-    path.write_text(ROBOT.read_text().split("scanners:")[0] + scanner)
-    assert main(["bridge", "--robot", str(path), "--scan", "scan"]) == 2
-    assert bad.split(":", maxsplit=1)[0] in capsys.readouterr().err
+    for key, value in {"field_of_view_deg": [90, -90], "yaw_deg": 200, "height_m": 0.2}.items():
+        scanner = f"scanners:\n  - position_base_m: [0.3, 0.0, 0.2]\n    {key}: {value}\n"
+        path.write_text(ROBOT.read_text().split("scanners:")[0] + scanner)
+        assert main(["bridge", "--robot", str(path), "--scan", "scan"]) == 2
+        assert key in capsys.readouterr().err
 
 
 def test_the_bridge_ends_after_its_seconds_without_a_robot(

@@ -37,6 +37,8 @@ def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(tmp_path: Path) 
             assert bridge.on_image(scene.image(now), now)
             recorder.draw_frame(bridge)
             recorder.draw(bridge, bridge.tick(now))
+    with pytest.raises(AwarenavError, match="there is no folder"):
+        RerunRecorder(tmp_path / "nowhere" / "run.rrd", 1.0)
     data = path.read_bytes()
     assert data.startswith(b"RRF")
     for entity in (
@@ -60,6 +62,3 @@ def test_a_cone_is_drawn_about_the_gaze_with_its_half_angle() -> None:
         assert np.allclose(axis[1] - apex, direction)
 
 
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(AwarenavError, match="there is no folder"):
-        RerunRecorder(tmp_path / "nowhere" / "run.rrd", 1.0)

@@ -181,16 +181,6 @@ def test_people_whose_crops_lie_outside_the_image_have_scores_of_0() -> None:
     assert (only.scores == 0.0).all()
 
 
-def test_keypoints_outside_the_image_have_scores_of_0() -> None:
-    graph, _, _ = network(17, (192, 144), depth=False)
-    box = PersonDetection(np.array([-100.0, 60.0, 60.0, 440.0]), 0.9)
-    (person,) = OnnxPoseEstimator(graph).estimate(IMAGE, (box,))
-    beyond = person.keypoints_px[:, 0] < -4.0
-    assert 3 < beyond.sum() < 17
-    assert (person.scores[beyond] == 0.0).all()
-    assert (person.scores[person.keypoints_px[:, 0] > 0.0] > 0.0).all()
-
-
 @pytest.mark.parametrize("invalid", [np.nan, np.inf])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_keypoint_with_a_non_finite_axis_has_a_score_of_0(invalid: float, axis: int) -> None:
