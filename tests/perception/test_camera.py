@@ -97,8 +97,6 @@ ODD = info(roi=(1, 0, 639, 480), binning=(2, 2))
 @pytest.mark.parametrize(
     ("fields", "image_px", "right"),
     [
-        (info(roi=(160, 120, 320, 240)), None, (320, 240, 500, 500, 160, 120)),
-        (info(binning=(2, 1)), None, (320, 480, 250, 500, 159.75, 240)),
         (
             info((1280, 960), (1000, 640, 480), (320, 240, 640, 480), (2, 2)),
             None,

@@ -169,6 +169,12 @@ def test_a_smaller_face_has_a_larger_standard_deviation():
     assert extra[1] < math.radians(1.0)
     far = head_at(distance_m=0.156 * CAMERA.fx_px / 4.0)
     assert judge_face(CAMERA, ALL, far, 0.3) == "face too small"
+    # One of twelve pixels is a weak measurement.
+    alpha, std = awareness_with_evidence(head_at(distance_m=0.156 * CAMERA.fx_px / 12.0))
+    near_alpha, near_std = awareness_with_evidence(head_at(distance_m=2.0))
+    assert std > 0.15
+    assert std > 8.0 * near_std
+    assert alpha - 1.28 * std < 0.5 < near_alpha - 1.28 * near_std
 
 
 def test_the_back_of_a_head_has_awareness_0_with_certainty():
@@ -177,15 +183,6 @@ def test_the_back_of_a_head_has_awareness_0_with_certainty():
     assert (alpha, std) == (0.0, pytest.approx(0.0, abs=1e-3))
     alpha, std = awareness_with_evidence(head_at(10.0, std_rad=0.6), with_scores(0, 0, 0, 1, 1))
     assert (alpha, std) == (0.0, pytest.approx(0.0, abs=1e-3))
-
-
-def test_a_face_of_twelve_pixels_is_a_weak_measurement():
-    small = head_at(distance_m=0.156 * CAMERA.fx_px / 12.0)
-    alpha, std = awareness_with_evidence(small)
-    near_alpha, near_std = awareness_with_evidence(head_at(distance_m=2.0))
-    assert std > 0.15
-    assert std > 8.0 * near_std
-    assert alpha - 1.28 * std < 0.5 < near_alpha - 1.28 * near_std
 
 
 # --- α and its standard deviation ----------------------------------------------------------------

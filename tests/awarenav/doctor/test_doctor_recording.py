@@ -289,4 +289,3 @@ def test_brakes_of_poor_odometry(capsys, tmp_path, change, noise_mps: float) -> 
     assert "braked 1 time," in text
     assert weakest == hardest == pytest.approx(0.8, abs=0.15)
     assert off_deg <= 5.0
-

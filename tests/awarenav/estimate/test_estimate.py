@@ -8,7 +8,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import av
-import click
 import cv2
 import numpy as np
 import pytest
@@ -325,5 +324,3 @@ def test_a_folder_of_frames_has_the_times_that_fps_says(tmp_path, capsys, fps, s
     assert estimate(NumberReader(), source, "--out", out, "--tracks", *given) == 0
     assert [record["stamp_s"] for record in read_records(out)] == pytest.approx(stamps_s)
     assert ("give --fps" in capsys.readouterr().err) == (fps is None)
-
-

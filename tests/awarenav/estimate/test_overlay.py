@@ -270,5 +270,3 @@ def test_other_places_are_refused(tmp_path, name, message):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(AwarenavError, match=message):
         OverlayWriter(tmp_path / name, 5.0, CONE)
-
-

@@ -7,17 +7,14 @@ import json
 import sys
 from typing import Any
 
-import cv2
 import numpy as np
 import onnxruntime
 import pytest
-from paths import SHARED
 
 from awarenav.errors import AwarenavError, MissingExtraError
 from awarenav.models import ModelStore
 from awarenav.models._movenet import movenet_onnx
-from perception import PersonDetection
-from perception.networks import OnnxModel, OnnxPoseEstimator
+from perception.networks import OnnxModel
 
 RNG = np.random.default_rng(0)
 
@@ -342,32 +339,3 @@ def test_the_genuine_networks_give_what_tensorflow_gives(
 ) -> None:
     (found,) = networks.load(f"movenet-{name}").run({"input": drawn_figure(size)})
     np.testing.assert_allclose(found[0, 0], OF_TENSORFLOW[name], atol=1e-4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["lightning", "thunder"])
-def test_keypoints_of_people_in_photographs_lie_where_people_labelled_them(
-    networks: ModelStore, name: str
-) -> None:
-    """Of those who are at least half as high as the picture, and alone in it."""
-    folder = SHARED / "images" / "dev"
-    if not (folder / "coco_labels.json").is_file():
-        pytest.skip("needs labelled photographs in the folder of genuine images")
-    estimator = OnnxPoseEstimator(networks.load(f"movenet-{name}"))
-    errors: list[float] = []
-    for photograph, labels in json.loads((folder / "coco_labels.json").read_text()).items():
-        people = labels["people"]
-        if len(people) != 1:
-            continue
-        box = np.array(people[0]["box_xyxy_px"])
-        height_px = box[3] - box[1]
-        if height_px < 0.5 * labels["size"][1]:
-            continue
-        image_rgb = cv2.cvtColor(cv2.imread(str(folder / photograph)), cv2.COLOR_BGR2RGB)
-        (found,) = estimator.estimate(image_rgb, (PersonDetection(box, 0.9),))
-        labelled = np.array(people[0]["keypoints_px"])
-        off_px = np.hypot(*(found.keypoints_px - labelled[:, :2]).T)
-        errors += (off_px[labelled[:, 2] == 2] / height_px).tolist()
-    assert len(errors) > 50
-    # Mirrored, with the axes swapped or in the crop's pixels, they are off by more than a tenth.
-    assert np.median(errors) < 0.02

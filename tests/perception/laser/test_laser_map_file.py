@@ -216,5 +216,3 @@ def test_damage_to_an_image_never_crashes(
     except PerceptionError:
         return
     assert np.isfinite(found.cells_m).all()
-
-

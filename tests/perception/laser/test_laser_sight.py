@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from laser_scenes import laser_scan, two_legs
 
 from perception.laser import LaserScan, Scanner, ScannerSight, SeenDirections, sight_of
 

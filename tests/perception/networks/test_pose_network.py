@@ -240,21 +240,15 @@ def test_movenet_finds_a_red_dot_of_each_person_at_its_pixel(dtype: str, batch: 
         assert not person.lifted
 
 
-def test_movenets_keypoints_that_are_not_finite_have_scores_of_0() -> None:
+def test_movenets_keypoints_that_are_not_finite_or_outside_the_image_have_scores_of_0() -> None:
     scores = np.full(17, 0.8)
     scores[3], scores[4] = math.nan, 1.5
-    (person,) = OnnxPoseEstimator(red_point_movenet(64, scores)).estimate(
-        red_dot(300.0, 200.0), (MIDDLE,)
-    )
+    estimator = OnnxPoseEstimator(red_point_movenet(64, scores))
+    (person,) = estimator.estimate(red_dot(300.0, 200.0), (MIDDLE,))
     assert (person.scores[3], person.scores[4]) == (0.0, 1.0)
-
-
-def test_movenets_keypoints_outside_the_image_have_scores_of_0() -> None:
-    """In a picture without red, the network's keypoints lie in the corner of its crop."""
+    # In a picture without red, the network's keypoints lie in the corner of its crop.
     corner = PersonDetection(np.array([0.0, 0.0, 100.0, 100.0]), 0.9)
-    (person,) = OnnxPoseEstimator(red_point_movenet(64, np.full(17, 0.8))).estimate(
-        IMAGE, (corner,)
-    )
+    (person,) = estimator.estimate(IMAGE, (corner,))
     assert (person.keypoints_px < -5.0).all()
     assert (person.scores == 0.0).all()
 
@@ -358,30 +352,17 @@ def body(yaw_rad: float = 0.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("yaw_deg", [0, 60, 250])
-def test_a_distant_body_is_recovered_at_any_heading(yaw_deg: float) -> None:
+def test_a_distant_body_is_recovered_at_any_heading_and_without_depths_is_flat(yaw_deg) -> None:
     points = body(math.radians(yaw_deg))
     pixels = points[:, :2] * FOCAL_PX / FAR_M + (320.0, 240.0)
     skeleton = lift_keypoints(pixels[None], points[None, :, 2], np.ones((1, 17)))[0]
     np.testing.assert_allclose(skeleton, points, atol=1e-9)
-
-
-def test_without_depths_the_skeleton_is_flat_and_has_the_right_scale() -> None:
-    points = body(math.radians(40))
-    pixels = points[:, :2] * FOCAL_PX / FAR_M
     skeleton = lift_keypoints(pixels[None], None, np.ones((1, 17)))[0]
     assert (skeleton[:, 2] == 0.0).all()
     np.testing.assert_allclose(skeleton[:, :2], points[:, :2], atol=1e-9)
 
 
-def test_limbs_that_point_at_the_camera_and_an_outlier_do_not_affect_the_scale() -> None:
-    points = body()
-    points[9, :2] += (0.5, 0.5)  # a wrist at a wrong place
-    pixels = points[None, :, :2] * FOCAL_PX / FAR_M
-    scale = metres_per_pixel(pixels, points[None, :, 2], np.ones((1, 17)))
-    assert scale[0] == pytest.approx(FAR_M / FOCAL_PX)
-
-
-def test_unseen_limbs_vote_only_if_no_limb_is_seen() -> None:
+def test_unseen_limbs_vote_only_if_no_limb_is_seen_and_an_outlier_does_not_count() -> None:
     points = body()
     pixels = points[None, :, :2] * FOCAL_PX / FAR_M
     wrong = pixels.copy()
@@ -392,6 +373,9 @@ def test_unseen_limbs_vote_only_if_no_limb_is_seen() -> None:
     assert shown[0] == pytest.approx(FAR_M / FOCAL_PX)
     guessed = metres_per_pixel(pixels, points[None, :, 2], np.zeros((1, 17)))
     assert guessed[0] == pytest.approx(FAR_M / FOCAL_PX)
+    pixels[0, 9] += 0.5 * FOCAL_PX / FAR_M  # a wrist at a wrong place
+    scale = metres_per_pixel(pixels, points[None, :, 2], np.ones((1, 17)))
+    assert scale[0] == pytest.approx(FAR_M / FOCAL_PX)
 
 
 @pytest.mark.parametrize(("yaw_deg", "distance_m"), [(0, 2.0), (45, 4.0), (110, 2.0)])
