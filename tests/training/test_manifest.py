@@ -72,7 +72,9 @@ def test_nothing_is_written_for_a_card_without_the_lines(folder, old, new, messa
     with pytest.raises(PerceptionError, match=message):
         update_manifest(folder, [ENTRY])
     assert not (folder / "manifest.json").exists()
-    # Nor for a missing file.
+
+
+def test_nothing_is_written_for_a_missing_file(folder):
     before = (folder / "thing.md").read_bytes()
     with pytest.raises(PerceptionError, match=r"cannot read .*other\.onnx"):
         update_manifest(folder, [ENTRY, ENTRY | {"name": "other"}])

@@ -352,11 +352,16 @@ def body(yaw_rad: float = 0.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("yaw_deg", [0, 60, 250])
-def test_a_distant_body_is_recovered_at_any_heading_and_without_depths_is_flat(yaw_deg) -> None:
+def test_a_distant_body_is_recovered_at_any_heading(yaw_deg: float) -> None:
     points = body(math.radians(yaw_deg))
     pixels = points[:, :2] * FOCAL_PX / FAR_M + (320.0, 240.0)
     skeleton = lift_keypoints(pixels[None], points[None, :, 2], np.ones((1, 17)))[0]
     np.testing.assert_allclose(skeleton, points, atol=1e-9)
+
+
+def test_without_depths_the_skeleton_is_flat_and_has_the_right_scale() -> None:
+    points = body(math.radians(40))
+    pixels = points[:, :2] * FOCAL_PX / FAR_M
     skeleton = lift_keypoints(pixels[None], None, np.ones((1, 17)))[0]
     assert (skeleton[:, 2] == 0.0).all()
     np.testing.assert_allclose(skeleton[:, :2], points[:, :2], atol=1e-9)
