@@ -126,8 +126,8 @@ def test_tracks_without_a_panel_are_counted_in_a_note(tmp_path):
 
 
 def test_nobody_and_one_frame_are_drawn_and_positions_have_no_panels_of_awareness(tmp_path):
-    for people, said in (([], "no people in 1 frame"), ([standing(3, 0)], "never confirmed")):
-        run = track_recording(recorded(tmp_path, lines(people, frames=1)))
+    for frames, said in enumerate(("no people in 0 frames", "never confirmed")):
+        run = track_recording(recorded(tmp_path, lines([standing(3, 0)], frames=frames)))
         figure = tracks_figure(run, "one")
         figure.canvas.draw()
         assert any(said in text for text in texts(figure))
