@@ -19,20 +19,34 @@ pytest.importorskip("mcap", reason="the extra ros2 is not installed")
 from rendered_image import RenderedImage, odometry
 from rosbags.highlevel import AnyReader
 
-from awarenav.bridge._loop import TopicPublisher
+from awarenav.bridge._loop import BridgeInputs, BridgeLoop, TopicPublisher
 from awarenav.cli import main
+from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import (
     PUBLISHED,
     READ,
     SLOWEST_MPS,
+    AwarenessBridge,
     DdsNode,
     McapRecorder,
     RobotFile,
 )
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
+from perception import AwarenessPipeline, Camera
 
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
 PATIENCE_S = 60.0
 SCANS = ["--scan", "a", "--scan", "b"]
+
+
+class Nobody:
+    """Networks that find nobody."""
+
+    def detect(self, image_rgb):
+        return ()
+
+    def estimate(self, image_rgb, *_):
+        return ()
 
 
 @pytest.fixture(scope="module")
@@ -170,6 +184,42 @@ def test_sigterm_ends_the_bridge_with_a_stop(domain: int) -> None:
             bridge.kill()
     assert bridge.returncode == 0, said
     assert "ended after 0 frames" in said
+
+
+def test_the_loop_waits_while_messages_come_that_it_does_not_need(domain: int) -> None:
+    node, other = DdsNode(domain), DdsNode(domain)
+    scene_camera = Camera(64, 48, 50.0, 50.0, 32.0, 24.0)
+    waits: list[float] = []
+    wait = node.wait
+
+    def counted(timeout_s: float) -> bool:
+        waits.append(timeout_s)
+        return wait(timeout_s)
+
+    node.wait = counted  # type: ignore[method-assign]
+    bridge = AwarenessBridge(
+        AwarenessPolicy.preset("balanced"),
+        RobotFile.from_yaml(ROBOT).profile(),
+        lambda key, message: None,
+        camera=scene_camera,
+        make_pipeline=lambda camera: AwarenessPipeline(camera, Nobody(), Nobody(), Nobody()),
+    )
+    loop = BridgeLoop(
+        node, bridge, BridgeInputs(READ["image"], READ["odom"], READ["camera_info"]), 20.0
+    )
+    try:
+        other.advertise(READ["camera_info"])
+        end = time.monotonic() + PATIENCE_S
+        while not other.readers_of(READ["camera_info"]) and time.monotonic() < end:
+            time.sleep(0.01)
+        other.publish(READ["camera_info"], CameraInfo())
+        loop.run(0.3)
+        # At most one for each publication and one for the message, and not thousands.
+        assert 3 <= len(waits) <= 12
+    finally:
+        assert loop.close()
+        other.close()
+        node.close()
 
 
 @pytest.mark.parametrize(
