@@ -86,8 +86,7 @@ def test_a_key_that_stands_twice_in_json_is_refused(text: str | bytes, key: str)
     with pytest.raises(PerceptionError, match=f"^text has the key '{key}' twice$"):
         parse_json(text, "text", finite=True)
 
-
-def test_the_same_key_of_two_objects_is_no_repetition() -> None:
+    # The same key of two objects is no repetition.
     text = '[{"a": {"a": 1}}, {"a": [{"a": 2}]}]'
     assert parse_json(text, "t") == parse_yaml(text, "t") == [{"a": {"a": 1}}, {"a": [{"a": 2}]}]
 
