@@ -28,7 +28,7 @@ def make_parser(
     """Return a parser, with ``--baseline`` and ``--out`` for a benchmark that has a baseline.
 
     Args:
-        program: module to run, such as ``"benchmarks.adapter"``.
+        program: module to run, such as ``"benchmarks.people"``.
         description: what the benchmark measures.
         baseline: the committed baseline, if any.
     """

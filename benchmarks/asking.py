@@ -18,7 +18,7 @@ from nav_adapter.policies import AttentionRules
 from perception.arrays import FloatArray
 from sim_tests.crossing import CrossingFrame, CrossingResult, named_policy
 from sim_tests.study.measures import EpisodeRecord
-from sim_tests.study.runs import job_of, named_templates, observed_episode, policy_text
+from sim_tests.study.runs import job_of, named_scenarios, observed_episode, policy_text
 
 #: A look that is measured later than this came too late for its request.
 SOON_S: Final = 1.0
@@ -184,14 +184,14 @@ def main() -> None:
         return Sums.of(
             observed_episode(
                 job_of(
-                    template.to_text(),
+                    scenario.to_text(),
                     (options.policy, policy_text(policy)),
                     "",
                     seed=seed,
                     perception=options.perception,
                 )
             )
-            for template in named_templates(options.scenario, population=population)
+            for scenario in named_scenarios(options.scenario, population=population)
             for seed in seeds
         )
 

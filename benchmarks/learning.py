@@ -28,7 +28,7 @@ from sim_tests.crossing.planner import make_planner
 from sim_tests.learning import CrossingEnv, NetworkPolicy, ObservationEncoder
 from sim_tests.study.measures import bootstrap_interval
 from sim_tests.study.report import Table
-from sim_tests.study.runs import named_templates
+from sim_tests.study.runs import named_scenarios
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _FOLDER: Final = _ROOT / "docs" / "learning"
@@ -57,7 +57,7 @@ Act = Callable[[CrossingEnv, dict[str, Any]], Any]
 
 
 def _environment(control_hz: float | None = None) -> CrossingEnv:
-    return CrossingEnv(named_templates(["all"]), scan_rays=_SCAN_RAYS, control_hz=control_hz)
+    return CrossingEnv(named_scenarios(["all"]), scan_rays=_SCAN_RAYS, control_hz=control_hz)
 
 
 def _episode(env: CrossingEnv, act: Act, **reset: Any) -> Episode:
@@ -152,9 +152,9 @@ def drive() -> None:
     drivers["random actions"] = lambda env, seen: rng.uniform(-1.0, 1.0, 2)
     env, rows = _environment(), []
     for label, act in drivers.items():
-        for template in named_templates(["all"]):
-            total, end, _, seconds = _episode(env, act, seed=_SEED, options={"scenario": template})
-            rows.append((label, template.name, round(total, 3), end, round(seconds, 2)))
+        for scenario in named_scenarios(["all"]):
+            total, end, _, seconds = _episode(env, act, seed=_SEED, options={"scenario": scenario})
+            rows.append((label, scenario.name, round(total, 3), end, round(seconds, 2)))
             print(*rows[-1], file=sys.stderr)
     _write("drives", ("planner", "scenario", "return", "end", "time_s"), rows)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
     from .crossing.planner import LocalPlanner, ReferencePlanner
     from .crossing.sensors import KeypointNoise
-    from .scenario import Scenario, ScenarioTemplate, shipped_scenarios
+    from .scenario import Scenario, shipped_scenarios
     from .world import Warehouse
     from .world.camera import CameraRenderer
     from .world.errors import SimError
@@ -37,7 +37,6 @@ __all__ = [
     "LocalPlanner",
     "ReferencePlanner",
     "Scenario",
-    "ScenarioTemplate",
     "SimError",
     "StraightOn",
     "Warehouse",

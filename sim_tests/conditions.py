@@ -172,7 +172,7 @@ def _axis(
         several: as for :class:`AxisOption`.
         also: further options that the value is made of, by name.
         empty: the value may be empty, and a table may lack the column.
-        changes_scenario: the value is given to ``with_NAME`` of the scenario's template.
+        changes_scenario: the value is given to ``with_NAME`` of the scenario.
         option: settings of the option of the same name, for one value.
     """
     about = {
@@ -356,10 +356,10 @@ _CHANGES: Final = tuple(
 
 
 def changed_scenario(scenario: _ScenarioT, values: Mapping[str, Any]) -> _ScenarioT:
-    """Return the template of a scenario as the axes among some values change it.
+    """Return a scenario as the axes among some values change it.
 
     Args:
-        scenario: a template, with a method ``with_NAME`` for each of these axes.
+        scenario: one with a method ``with_NAME`` for each of these axes.
         values: by the name of the axis; None and empty ones change nothing.
     """
     for name in _CHANGES:

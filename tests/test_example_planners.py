@@ -10,7 +10,7 @@ import pytest
 from paths import ROOT
 
 from nav_adapter import AwarenessPolicy
-from sim_tests import NOVA_CARTER, CrossingResult, Scenario, ScenarioTemplate, run_crossing
+from sim_tests import NOVA_CARTER, CrossingResult, Scenario, run_crossing
 from sim_tests.study.measures import fastest_point_excess_mps, limit_excess_mps
 
 PLANNERS = {
@@ -37,7 +37,7 @@ def make(request, examples):
         pytest.skip(f"{request.param} is not installed (extra dev)")
     pytest.importorskip("pybullet", reason="the crossings need the extra sim")
     planner = getattr(importlib.import_module(f"examples.planners.{module}"), name)
-    boxes = ScenarioTemplate.shipped("crossing_attentive").for_seed(0).planner_boxes_odom_m
+    boxes = Scenario.shipped("crossing_attentive").draw(0).planner_boxes_odom_m
     return lambda field: planner(NOVA_CARTER, static_boxes_odom_m=boxes, use_speed_field=field)
 
 
@@ -103,7 +103,7 @@ def test_with_the_speed_field_somebody_busy_is_passed_and_corners_obey(
     if importlib.util.find_spec(package) is None:
         pytest.skip(f"{package} is not installed (extra dev)")
     planner = getattr(importlib.import_module(f"examples.planners.{module}"), name)
-    scenario = ScenarioTemplate.shipped("busy_in_aisle").for_seed(1)
+    scenario = Scenario.shipped("busy_in_aisle").draw(1)
     driver = planner(NOVA_CARTER, scenario.planner_boxes_odom_m)
     result = run_crossing(scenario, policy="balanced", planner=driver, seed=1)
     assert result.success

@@ -1,16 +1,17 @@
 """Every example runs; the code on the pages is run by ``test_page_code.py``."""
 
-import os
+import contextlib
+import io
 import re
-import subprocess
+import runpy
 import sys
 from functools import cache
+from unittest.mock import patch
 
 import pytest
 from paths import ROOT
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-SEARCHED = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 
 # Packages that an example needs beyond the core.
@@ -30,18 +31,15 @@ DRIVING = (
 
 @cache
 def printed(name, *arguments):
-    """Return the output of an example, run with warnings as errors."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(ROOT / "examples" / name), *arguments],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=120,
-        check=False,
-        env={"PYTHONPATH": SEARCHED},
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    """Return the output of an example, run as a script with warnings as errors."""
+    file = ROOT / "examples" / name
+    with (
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        patch.object(sys, "argv", [str(file), *arguments]),
+        patch.object(sys, "path", [str(file.parent), *sys.path]),
+    ):
+        runpy.run_path(str(file), run_name="__main__")
+    return out.getvalue()
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

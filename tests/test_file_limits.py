@@ -29,12 +29,12 @@ from perception.surround import FisheyeLens
 from sim_tests import SimError
 from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
-from sim_tests.scenario import Scenario, ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.scenario._files import camera_data
 from sim_tests.search._settings import write_or_check_settings
 from sim_tests.search.falsify._search import FalsifySettings
 from sim_tests.search.tune._policy_space import read_ranges
-from sim_tests.study.runs import fault_of, policy_of, read_jobs, read_run, template_of
+from sim_tests.study.runs import fault_of, policy_of, read_jobs, read_run, scenario_of
 from tracking import TrackerConfig, TrackingError
 
 BRACKETS = "[" * 100_000
@@ -77,7 +77,6 @@ YAML_READERS = {
     "RobotFile": (RobotFile.from_yaml, ValueError),
     "Catalogue": (Catalogue.from_yaml, AwarenavError),
     "Scenario": (Scenario.from_yaml, SimError),
-    "ScenarioTemplate": (ScenarioTemplate.from_yaml, SimError),
     "camera of a scenario": (lambda path: camera_data(str(path)), SimError),
     "Fault": (lambda path: Fault.of(str(path)), SimError),
     "ranges of a tuning": (read_ranges, SimError),
@@ -114,7 +113,7 @@ def test_every_reader_refuses_hostile_yaml(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", JSON_READERS)
-def test_every_reader_refuses_hostile_json(name, tmp_path):
+def test_every_reader_refuses_hostile_and_huge_json(name, tmp_path):
     file, read, error = JSON_READERS[name]
     path = tmp_path / file
     path.write_text(BRACKETS + "\n")
@@ -122,18 +121,13 @@ def test_every_reader_refuses_hostile_json(name, tmp_path):
         read(path)
     assert path.name in str(caught.value)
 
-
-@pytest.mark.parametrize("name", JSON_READERS)
-def test_huge_json_is_refused_by_every_reader(name, tmp_path):
-    file, read, error = JSON_READERS[name]
-    path = tmp_path / file
     with path.open("wb") as hole:  # takes no space on the disk
         hole.truncate((MAX_LINE_BYTES if path.suffix == ".jsonl" else MAX_JSON_BYTES) + 1)
     with pytest.raises(error, match=r"too large: at most (16|64) MiB"):
         read(path)
 
 
-@pytest.mark.parametrize("read", [policy_of, fault_of, template_of])
+@pytest.mark.parametrize("read", [policy_of, fault_of, scenario_of])
 def test_hostile_texts_of_a_job_are_refused(read):
     with pytest.raises(SimError, match="more than 200000 values"):
         read(ALIASES)

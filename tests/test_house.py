@@ -7,16 +7,13 @@ import re
 import pytest
 from paths import ROOT
 
-from tools.house import PACKAGES, PICTURE, build_graph, picture, storeys
+from tools.house import PACKAGES, PICTURE, imports, picture, storeys
 
 
-def test_the_picture_is_that_of_the_imports() -> None:
+def test_the_picture_is_that_of_the_imports_and_a_module_stands_above_those() -> None:
     """After another module or import: python -m tools.house."""
-    assert PICTURE.read_text(encoding="utf-8") == picture()
-
-
-def test_a_module_stands_above_those_that_it_imports() -> None:
-    graph = build_graph(*PACKAGES, cache_dir=None)
+    graph = imports()
+    assert PICTURE.read_text(encoding="utf-8") == picture(graph)
     for package in PACKAGES:
         rows = storeys(graph, package)
         floor = {f"{package}.{name}": -number for number, row in enumerate(rows) for name in row}

@@ -31,7 +31,7 @@ def read_results(board: Board, row: Row, folder: Path = RESULTS) -> tuple[Episod
     path = folder / f"{row.name}.csv"
     if not path.exists():
         return ()
-    versions = {each.name: each.version for each in board.templates}
+    versions = {each.name: each.version for each in board.all_scenarios}
     order = {name: number for number, name in enumerate(versions)}
     kept = [
         record
@@ -85,7 +85,7 @@ def measure(
         done = {(each.scenario, each.seed) for each in kept}
         jobs = [
             job
-            for job in row.jobs(board.templates, range(board.seeds))
+            for job in row.jobs(board.all_scenarios, range(board.seeds))
             if (job.conditions.scenario, job.conditions.seed) not in done
         ]
         if not jobs:

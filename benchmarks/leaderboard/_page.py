@@ -102,7 +102,7 @@ class Standing:
 
 def standings(board: Board, folder: Path = RESULTS) -> list[Standing]:
     """Return every row with its results, in the order of the board."""
-    planned = len(board.templates) * board.seeds
+    planned = len(board.all_scenarios) * board.seeds
     return [Standing(row, read_results(board, row, folder), planned) for row in board.rows]
 
 
@@ -119,7 +119,7 @@ def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
     note = "Means have 95 % intervals."
     if missing:
         note += f" Not complete, and so without a rank: {missing}."
-    scenarios = len(board.templates)
+    scenarios = len(board.all_scenarios)
     return _TEMPLATE.read_text(encoding="utf-8").format(
         **{name: table.markdown() for name, table in tables.items()},
         **steps_out(),
@@ -234,7 +234,7 @@ def steps_out() -> dict[str, str]:
         dict.fromkeys(("touched while it moved", *ROBOTS.values()), ""),
         [
             [f"`{of.name}`", *(touched(robots[name], of.name) for name in ROBOTS)]
-            for of in board.templates
+            for of in board.all_scenarios
         ],
     )
     measured = "; ".join(dict.fromkeys(map(_measured, read_about(STEP_OUT).values())))

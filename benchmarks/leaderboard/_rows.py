@@ -15,8 +15,8 @@ from perception.documents import read_yaml
 from sim_tests import SimError
 from sim_tests.conditions import Perception
 from sim_tests.crossing import named_policy
-from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.runs import Job, named_templates, plan_jobs, policy_text
+from sim_tests.scenario import Scenario
+from sim_tests.study.runs import Job, named_scenarios, plan_jobs, policy_text
 from sim_tests.world.config import SimConfig
 
 #: The repository.
@@ -86,7 +86,7 @@ class Row(SimConfig):
             text += (ROOT / self.networks).read_text(encoding="utf-8")
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
-    def jobs(self, templates: Sequence[ScenarioTemplate], seeds: Sequence[int]) -> tuple[Job, ...]:
+    def jobs(self, scenarios: Sequence[Scenario], seeds: Sequence[int]) -> tuple[Job, ...]:
         """Return its episodes: every seed in every scenario.
 
         Raises:
@@ -94,7 +94,7 @@ class Row(SimConfig):
         """
         truth = self.sensors == _TRUTH
         return plan_jobs(
-            templates,
+            scenarios,
             [(self.policy_name, self._policy)],
             seeds,
             planners=["" if self.planner == _REFERENCE else self.planner],
@@ -142,9 +142,9 @@ class Board(SimConfig):
             raise SimError(f"{path.name}: {cause}") from cause
 
     @property
-    def templates(self) -> tuple[ScenarioTemplate, ...]:
+    def all_scenarios(self) -> tuple[Scenario, ...]:
         """The scenarios."""
-        return named_templates(self.scenarios)
+        return named_scenarios(self.scenarios)
 
     def named(self, name: str) -> Row:
         """Return a row.

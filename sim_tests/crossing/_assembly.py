@@ -26,7 +26,7 @@ from ..conditions import (
     refuse_unused_networks,
     table_name,
 )
-from ..scenario import SCENARIO_SETS, Scenario, ScenarioTemplate, shipped_scenarios
+from ..scenario import SCENARIO_SETS, Scenario, shipped_scenarios
 from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner
@@ -65,7 +65,7 @@ class Setup:
     @classmethod
     def of(
         cls,
-        scenario: Scenario | ScenarioTemplate | str,
+        scenario: Scenario | str,
         *,
         policy: AwarenessPolicy | str | Path,
         planner: LocalPlanner | str | None = None,
@@ -87,9 +87,7 @@ class Setup:
             raise SimError(f"seed must be 0 or more, got {seed}")
         sight = Perception.named(perception)
         refuse_unused_networks(axes, sight.kind)
-        drawn = changed(scenario, axes)
-        if isinstance(drawn, ScenarioTemplate):
-            drawn = drawn.for_seed(seed)
+        drawn = changed(scenario, axes).draw(seed)
         policy_name, own_policy = named_policy(policy)
         driver = "" if planner in (None, REFERENCE_PLANNER) else planner
         own_fault = named_fault(fault)
@@ -146,24 +144,19 @@ class Setup:
         return stage, sensing, adapter(self.policy, scenario.robot_profile)
 
 
-def changed(
-    scenario: Scenario | ScenarioTemplate | str, axes: Mapping[str, Any]
-) -> Scenario | ScenarioTemplate:
+def changed(scenario: Scenario | str, axes: Mapping[str, Any]) -> Scenario:
     """Return a scenario as the camera, the robot, the population and the like change it.
 
     Args:
-        scenario: a scenario, a template, a shipped name or a YAML file.
+        scenario: a scenario, a shipped name or a YAML file.
         axes: by name; None and empty ones keep the scenario's own.
 
     Raises:
         SimError: an unknown scenario, camera, robot or population.
     """
     if isinstance(scenario, str):
-        scenario = ScenarioTemplate.named(scenario)
-    given = {name: value for name, value in axes.items() if value not in (None, "")}
-    if isinstance(scenario, Scenario) and given:
-        scenario = ScenarioTemplate(scenario.model_dump(mode="json"), scenario.name)
-    return changed_scenario(scenario, given)
+        scenario = Scenario.named(scenario)
+    return changed_scenario(scenario, axes)
 
 
 def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:

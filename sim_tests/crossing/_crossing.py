@@ -18,7 +18,7 @@ from perception.arrays import FloatArray
 
 from ..actors.behaviour import RequestMeans
 from ..actors.robot import RobotModel
-from ..scenario import Scenario, ScenarioTemplate
+from ..scenario import Scenario
 from ..world.render import RendererName
 from ._assembly import Setup
 from ._command import checked_command
@@ -147,7 +147,7 @@ class Crossing(AbstractContextManager["Crossing"]):
 
 
 def run_crossing(
-    scenario: Scenario | ScenarioTemplate | str,
+    scenario: Scenario | str,
     *,
     policy: AwarenessPolicy | str | Path = "balanced",
     planner: LocalPlanner | str | None = None,
@@ -165,7 +165,7 @@ def run_crossing(
     """Run one crossing in PyBullet and return its log.
 
     Args:
-        scenario: a scenario; or a template, a shipped name or a YAML file, drawn by the seed.
+        scenario: a scenario, a shipped name or a YAML file; it is drawn by the seed.
         policy: a policy, the name of a preset, or a YAML file; see :func:`named_policy`.
         planner: the local planner, or its name as for :func:`make_planner`; None for the reference
             :class:`ReferencePlanner`, or for :class:`StraightOn` where the scenario drives straight
@@ -177,7 +177,7 @@ def run_crossing(
             scanners, and ``"scanner"`` has them alone.
         seed: the same seed gives the same result, bit for bit, but for the times of ``plan_s``.
         robot: a robot model, a shipped name, a YAML file, or a profile; the scenario is fitted to
-            it by :func:`scenario_for_robot`. None for the scenario's own.
+            it by :meth:`Scenario.with_robot`. None for the scenario's own.
         noise: noise of the keypoint camera; None for the default.
         pipeline: pipeline for ``"pixels"`` instead of the shipped networks; its camera must be that
             of the images.

@@ -73,6 +73,7 @@ class TrueView:
         since_look_s: time since the person last looked at the robot: 0 during a look, infinite
             before the first. A head that faces the robot without a look does not count.
         noticed: whether a look of theirs has taken the robot in.
+        heading_odom_rad: heading of the body.
     """
 
     position_camera_m: FloatArray
@@ -84,6 +85,7 @@ class TrueView:
     away: bool = False
     since_look_s: float = math.inf
     noticed: bool = False
+    heading_odom_rad: float = 0.0
 
     @property
     def d_fwd_m(self) -> float:
@@ -240,6 +242,7 @@ class Stage(AbstractContextManager["Stage"]):
                     motion.away,
                     person.since_look_s,
                     person.noticed_s is not None,
+                    motion.heading_odom_rad,
                 )
             )
         return tuple(views)

@@ -21,9 +21,9 @@ import numpy as np
 import awarenav
 
 from ..crossing import CrossingResult, Observer, run_crossing
-from ..scenario import Scenario, ScenarioTemplate
+from ..scenario import Scenario
 from ..study.measures import NOTHING, number_text
-from ..study.runs import observed_episode, plan_jobs, template_of
+from ..study.runs import observed_episode, plan_jobs, scenario_of
 from ._film import passage
 
 #: Name of the scenario.
@@ -126,7 +126,7 @@ def run_lane(lane: Lane, seed: int, observer: Observer | None = None) -> LaneRun
         [SCENARIO], [lane.policy], [seed], planners=[lane.planner], sensors=[lane.sensors]
     )
     result, record = observed_episode(job, observer)
-    scenario = template_of(job.scenario_text).for_seed(seed)
+    scenario = scenario_of(job.scenario_text).draw(seed)
     phone, watcher = (_number(scenario, steps_out=each) for each in (True, False))
     near = passage(result, phone)
     figures = (
@@ -150,7 +150,7 @@ def run_lane(lane: Lane, seed: int, observer: Observer | None = None) -> LaneRun
 
 def run_nobody(seed: int) -> CrossingResult:
     """Run awarenav's robot with the same task and nobody there."""
-    scenario = ScenarioTemplate.shipped(SCENARIO).for_seed(seed).without_people()
+    scenario = Scenario.shipped(SCENARIO).draw(seed).without_people()
     return run_crossing(scenario, policy="balanced", perception="keypoints+scanner", seed=seed)
 
 
@@ -243,7 +243,7 @@ def legend(seeds: int) -> str:
 def report_text(rows: Iterable[LaneRow]) -> str:
     """Return rows as JSON Lines, below a line that says what was measured, and when."""
     about = {
-        "scenario": ScenarioTemplate.shipped(SCENARIO).id,
+        "scenario": Scenario.shipped(SCENARIO).id,
         "version": awarenav.__version__,
         "date": date.today().isoformat(),
     }

@@ -34,7 +34,7 @@ from ..crossing import (
     named_policy,
 )
 from ..crossing.faults import Fault
-from ..scenario import Scenario, ScenarioTemplate
+from ..scenario import Scenario
 from ..world.config import SimConfig
 from ..world.errors import SimError
 from ._policy_planner import Observation, ObservationEncoder, action_limits, command_of
@@ -90,7 +90,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
     scenario. A copy or an unpickled environment has the same arguments and no episode.
 
     Args:
-        scenarios: names of shipped scenarios, YAML files, scenarios or templates, one or several;
+        scenarios: names of shipped scenarios, YAML files or scenarios, one or several;
             with several each episode draws one.
         policy: a policy, the name of a preset, or a YAML file.
         perception: one of ``run_crossing``'s.
@@ -125,7 +125,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
 
     def __init__(
         self,
-        scenarios: str | Scenario | ScenarioTemplate | Sequence[Any] = "crossing_from_left",
+        scenarios: str | Scenario | Sequence[Any] = "crossing_from_left",
         policy: AwarenessPolicy | str | Path = "balanced",
         perception: str = "truth",
         control_hz: float | None = None,
@@ -143,7 +143,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
     ) -> None:
         given = {name: value for name, value in locals().items() if name in _ARGUMENTS}
         EzPickle.__init__(self, **given, **axes)
-        if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
+        if isinstance(scenarios, (str, Scenario)):
             scenarios = (scenarios,)
         own_robot = None if robot is None else RobotModel.of(robot)
         # The conditions that change the scenario, which is done once, and not in every episode.
@@ -181,8 +181,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
-        drawn = [each if isinstance(each, Scenario) else each.median() for each in self._scenarios]
-        limits = np.max([action_limits(each.robot_profile) for each in drawn], axis=0)
+        limits = np.max([action_limits(each.robot_profile) for each in self._scenarios], axis=0)
         self.action_space = (
             spaces.Box(-1.0, 1.0, (2,), np.float32)
             if normalised_actions
@@ -231,8 +230,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         choice = int(self.np_random.integers(len(self._scenarios)))
         episode_seed = drawn if seed is None else seed
         given = (options or {}).get("scenario")
-        template = self._scenarios[choice] if given is None else self._changed(given)
-        scenario = template if isinstance(template, Scenario) else template.for_seed(episode_seed)
+        scenario = self._scenarios[choice] if given is None else self._changed(given)
+        scenario = scenario.draw(episode_seed)
         if self._control_hz is not None:
             scenario = scenario.model_copy(update={"control_hz": self._control_hz})
         self.close()
@@ -317,12 +316,11 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             self._violation_s += self.crossing.dt_s * (now.margin_m < 0.0)
         return now
 
-    def _changed(self, given: Any) -> Scenario | ScenarioTemplate:
+    def _changed(self, given: Any) -> Scenario:
         """Return a scenario with the robot, the population and the like of the environment."""
-        if not isinstance(given, (str, Scenario, ScenarioTemplate)):
+        if not isinstance(given, (str, Scenario)):
             raise SimError(
-                "a scenario must be a name, a YAML file, a Scenario or a template, got "
-                f"{given!r:.80}"
+                f"a scenario must be a name, a YAML file or a Scenario, got {given!r:.80}"
             )
         return changed(given, self._axes)
 

@@ -9,9 +9,7 @@ from perception.lazy import lazy_page
 if TYPE_CHECKING:
     from ._distributions import Choice, Distribution, Integers, read_distribution
     from ._files import SCENARIO_SETS, shipped_scenarios
-    from ._for_robot import scenario_for_robot
     from ._networks import load_networks
     from ._scenario import CameraSpec, RobotTask, Scenario
-    from ._template import ScenarioTemplate, shipped_templates
 
 __getattr__ = lazy_page(__name__, __file__)

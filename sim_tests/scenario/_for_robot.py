@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,62 +12,31 @@ from nav_adapter import RobotProfile
 from perception.arrays import FloatArray
 
 from ..actors.robot import NOVA_CARTER, RobotModel
-from ._scenario import Scenario
 
 # Share of the longer reach that becomes room beside the lane: a long robot swings its ends out.
 _SWING_SHARE: Final = 0.5
 
 
-def scenario_for_robot(
-    scenario: Scenario, robot: RobotModel | RobotProfile | str | Path
-) -> Scenario:
-    """Return a scenario for another robot than the one that it was made for, the Nova Carter.
+def fit(data: dict[str, Any], model: RobotModel) -> None:
+    """Fit the fields of a scenario, made for the Nova Carter, to another robot, in place.
 
-    *Room.* The lane, the aisle along it, and everything beside the line from start to goal, which
-    may lie at any angle, move outward by what the robot is
-    wider, and by half of what it reaches farther from its base. Places within the aisle are
-    stretched; racks and people's routes beyond it are shifted. Pauses and turns stay at the same
-    place of the route. The hall is longer by what the robot is longer.
-
-    *Time.* The duration grows with the time that the way takes at the robot's speed and
-    acceleration. People start later by what the robot takes longer for half of the way, so that
-    they still meet; those who set off as it comes let a slower robot come nearer, as near in time.
-    Smaller and faster robots change neither. Recorded people (``replay_csv``) stay
-    as they were recorded, in place and in time.
-
-    The name becomes ``scenario_robot``, such as ``blind_corner_forklift``.
-
-    Args:
-        scenario: the scenario. One that has a robot already is returned as it is, if it is the
-            same.
-        robot: a model, a shipped name, a YAML file, or a profile.
-
-    Raises:
-        SimError: for an unknown robot, or a scenario that has another robot already.
+    See :class:`~sim_tests.scenario.Scenario`. Places within the aisle are stretched; racks and
+    people's routes beyond it are shifted. Pauses and turns stay at the same place of the route. The
+    hall is longer by what the robot is longer. People start later by what the robot takes longer
+    for half of the way; those who set off as it comes let a slower robot come nearer, as near in
+    time. Smaller and faster robots change neither.
     """
-    model = RobotModel.of(robot)
-    if scenario.robot_model is not None:
-        if scenario.robot_model == model:
-            return scenario
-        raise scenario.error(
-            f"scenario {scenario.name!r} is for the robot {scenario.robot_model.name!r} already, "
-            f"got {model.name!r}"
-        )
-    if model.body == "nova_carter":
-        return scenario
-    data = scenario.model_dump()
     _widen(data, model)
     usual, slower = NOVA_CARTER, model.profile
-    task = scenario.robot
-    way_m = math.hypot(task.goal_x_m - task.start_x_m, task.goal_y_m - task.start_y_m)
+    task = data["robot"]
+    way_m = math.hypot(task["goal_x_m"] - task["start_x_m"], task["goal_y_m"] - task["start_y_m"])
     ratio = max(_drive_s(slower, way_m) / _drive_s(usual, way_m), 1.0)
-    data["duration_s"] = min(scenario.duration_s * ratio, 600.0)
+    data["duration_s"] = min(data["duration_s"] * ratio, 600.0)
     half_m = 0.5 * way_m
     _delay(data, max(_drive_s(slower, half_m) - _drive_s(usual, half_m), 0.0))
     _let_nearer(data, min(slower.max_speed_mps / usual.max_speed_mps, 1.0))
-    data |= {"name": f"{scenario.name}_{model.name}", "robot_model": model}
+    data |= {"name": f"{data['name']}_{model.name}", "robot_model": model}
     data["scanners"] = model.scanners
-    return Scenario.from_data(data, scenario.name)
 
 
 def _drive_s(robot: RobotProfile, way_m: float) -> float:

@@ -1,14 +1,16 @@
-"""A crossing as data: hall, robot task, camera and people."""
+"""A crossing as data: hall, robot task, camera and people, with numbers that may be drawn."""
 
 from __future__ import annotations
 
+import copy
+import hashlib
 import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from nav_adapter import RobotProfile
 from perception import Camera
@@ -29,9 +31,13 @@ from ..world.config import SimConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
 from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
-from ._distributions import error_text, find_parameters, with_numbers
-from ._files import parse_yaml, read_file, require_version, shipped_text
+from ._distributions import Distribution, error_text, find_parameters, with_numbers
+from ._files import camera_data, parse_yaml, read_file, require_version, shipped_text
+from ._for_robot import fit
+from ._networks import networks_data
 
+# The key of a robot to which the scenario is fitted.
+_FOR_ROBOT: Final = "for_robot"
 # Largest distance between neighbours on the reference path.
 _PATH_SPACING_M: Final = 0.25
 
@@ -179,7 +185,20 @@ def _layout(value: Any) -> Any:
 
 
 class Scenario(SimConfig):
-    """One crossing.
+    """One crossing, or any number of them where some of its numbers are distributions.
+
+    In its file any number under ``people`` and ``robot`` may be a mapping such as
+    ``{uniform: {low: 1.0, high: 2.0}}``, ``{normal: {mean:, std:, low:, high:}}``,
+    ``{lognormal: {median:, quartiles: [,]}}``, ``{integers: {low:, high:}}`` or
+    ``{choice: [...]}``. The attributes have the medians; :meth:`draw` draws the scenario of an
+    episode. A copy with other values (``model_copy``) has no distributions.
+
+    The key ``for_robot`` names a robot (a shipped one, a YAML file, or the keys of a
+    :class:`~sim_tests.actors.robot.RobotModel`) to which every draw is fitted. *Room*: the lane,
+    the aisle along it, and everything beside the line from start to goal move outward by what the
+    robot is wider, and by half of what it reaches farther from its base. *Time*: the duration grows
+    with the time that the way takes, and people come later, so that they still meet the robot.
+    Recorded people stay as they were recorded. The name becomes ``scenario_robot``.
 
     Attributes:
         name: identifier, also of the shipped file.
@@ -193,11 +212,11 @@ class Scenario(SimConfig):
         robot: the robot's task.
         robot_model: the robot; a shipped name, a YAML file or the keys of a
             :class:`~sim_tests.actors.robot.RobotModel`; None for the Nova Carter. See
-            :func:`~sim_tests.scenario.scenario_for_robot`, which fits room and time as well.
+            :meth:`with_robot`, which fits room and time as well.
         camera: the robot's camera; a robot model has its place.
         networks: networks for the pictures of the camera, instead of the shipped ones: the keys of
             a file for ``--networks``, and ``sha256`` of each file among them; see
-            :meth:`ScenarioTemplate.with_networks`.
+            :meth:`with_networks`.
         scanners: the robot's laser scanners; they are used where a crossing asks for them.
         people: people who look, react and walk by themselves; names are unique.
         population: habits of the people: ``"classic"``, or ``"recorded"`` as fitted to recorded
@@ -232,6 +251,9 @@ class Scenario(SimConfig):
     replay_reacts: bool = False
     replay_leaves: bool = False
     start_jitter_s: float = Field(default=0.0, ge=0.0)
+    # The keys as they were given, with distributions; empty for fields that were set.
+    _written: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _distributions: dict[str, Distribution] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="after")
     def _unique_names(self) -> Scenario:
@@ -249,37 +271,126 @@ class Scenario(SimConfig):
 
     @classmethod
     def shipped(cls, name: str) -> Scenario:
-        """Load a scenario that comes with the package, with distributions at their medians.
-
-        Raises:
-            SimError: for another name; ``name@2`` also for another version.
-        """
+        """Load one that comes with the package, by ``name``, or by ``name@2`` with a version."""
         plain, text = shipped_text(name)
-        scenario = cls._at_medians(parse_yaml(text, plain), plain)
+        scenario = cls.from_text(text, plain)
         require_version(name, scenario.version)
         return scenario
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Scenario:
-        """Read a scenario's file, with distributions at their medians.
+        """Read a file; its ``replay_csv`` is relative to its folder.
 
         Raises:
             SimError: naming the file and the wrong key.
         """
-        return cls._at_medians(read_file(Path(path), cls.model_fields), str(path))
+        return cls.from_data(read_file(Path(path), cls.model_fields), str(path))
+
+    @classmethod
+    def named(cls, name: str) -> Scenario:
+        """Load a YAML file if the name ends in ``.yaml`` or ``.yml``, else a shipped one."""
+        return cls.from_yaml(name) if name.endswith((".yaml", ".yml")) else cls.shipped(name)
+
+    @classmethod
+    def from_text(cls, text: str, source: str = "scenario") -> Scenario:
+        """Read YAML, for example the text of :meth:`to_text`."""
+        return cls.from_data(parse_yaml(text, source), source)
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], source: str = "scenario") -> Scenario:
-        """Validate the keys of a scenario."""
-        try:
-            scenario = cls.model_validate(data)
-        except ValidationError as cause:
-            raise SimError(f"{source}: {error_text(cause)}") from cause
-        return scenario.with_population(scenario.population)
+        """Validate the keys of a scenario, at the medians of its distributions.
+
+        Args:
+            data: the keys, as read from YAML.
+            source: name of the scenario in messages.
+
+        Raises:
+            SimError: naming the wrong path, for unknown keys, impossible distributions, and a
+                scenario that is not valid at the medians.
+        """
+        distributions = find_parameters(data, source)
+        scenario = cls._valid(with_numbers(data, distributions, {}, source), source)
+        scenario._written = copy.deepcopy(dict(data))
+        scenario._distributions = distributions
+        return scenario
 
     @classmethod
-    def _at_medians(cls, data: dict[str, Any], source: str) -> Scenario:
-        return cls.from_data(with_numbers(data, find_parameters(data, source), {}, source), source)
+    def _valid(cls, data: dict[str, Any], source: str) -> Scenario:
+        """Return the scenario of keys without distributions, fitted to its robot."""
+        robot = data.get(_FOR_ROBOT)
+        model = None if robot is None else _robot_of(robot, source)
+        try:
+            scenario = cls.model_validate({k: data[k] for k in data if k != _FOR_ROBOT})
+            if model is not None:
+                scenario = scenario._fitted_to(model)
+        except ValidationError as cause:
+            raise SimError(f"{source}: {error_text(cause)}") from cause
+        scenario._written = data
+        return scenario
+
+    def _fitted_to(self, model: RobotModel) -> Scenario:
+        own = self.robot_model
+        if own is not None and own != model:
+            raise SimError(
+                f"scenario {self.name!r} is for the robot {own.name!r} already, got {model.name!r}"
+            )
+        if own is not None or model.body == "nova_carter":
+            return self
+        data = self.model_dump()
+        fit(data, model)
+        return self.model_validate(data)
+
+    @property
+    def id(self) -> str:
+        """Name and version, such as ``"crossing_from_left@1"``."""
+        return f"{self.name}@{self.version}"
+
+    @property
+    def distributions(self) -> Mapping[str, Distribution]:
+        """The distributions by dotted path, such as ``"people.0.speed_mps"``."""
+        return self._distributions
+
+    def draw(self, seed: int) -> Scenario:
+        """Return the scenario of the episode with this seed; itself without distributions.
+
+        Each distribution has a random stream of its own, which depends only on the seed and on its
+        path: adding or removing one changes none of the others.
+
+        Raises:
+            SimError: if the values drawn are not valid together.
+        """
+        if not self._distributions:
+            return self
+        key = np.random.default_rng(seed).integers(0, 2**32, 4, dtype=np.uint64).tolist()
+        return self.with_values(
+            {path: each.quantile(_uniform(key, path)) for path, each in self.distributions.items()}
+        )
+
+    def with_values(self, values: Mapping[str, float]) -> Scenario:
+        """Return the scenario with these values for distributions and the medians of the others.
+
+        Raises:
+            SimError: for a path without a distribution, and for values that are not valid.
+        """
+        data = with_numbers(self._keys, self._distributions, values, self.name)
+        return self._valid(data, self.name)
+
+    def model_copy(
+        self, *, update: Mapping[str, Any] | None = None, deep: bool = False
+    ) -> Scenario:
+        """Return a copy with other values, which are not checked, and without distributions."""
+        changed = super().model_copy(update=update, deep=deep)
+        changed._written, changed._distributions = {}, {}
+        return changed
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scenario) and (self.model_dump(), self._distributions) == (
+            other.model_dump(),
+            other._distributions,
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.id)
 
     @property
     def robot_profile(self) -> RobotProfile:
@@ -304,11 +415,32 @@ class Scenario(SimConfig):
         return np.vstack([boxes, *np.array(real).reshape(-1, 1, 4)])
 
     def to_text(self) -> str:
-        """Return the scenario as YAML, for :meth:`ScenarioTemplate.from_text`."""
-        data = self.model_dump(mode="json")
-        if self.robot_model is None:
-            del data["robot_model"]
-        return yaml_text(data)
+        """Return YAML for :meth:`from_text`, with the shared defaults written out."""
+        return yaml_text(self._keys)
+
+    @property
+    def _keys(self) -> dict[str, Any]:
+        unused = {"robot_model"} if self.robot_model is None else None
+        return self._written or self.model_dump(mode="json", exclude=unused)
+
+    def with_robot(self, robot: RobotModel | RobotProfile | str | Path) -> Scenario:
+        """Return the same scenario fitted to another robot.
+
+        Raises:
+            SimError: for an unknown robot, or a scenario that is another robot's already.
+        """
+        if robot == "":
+            return self
+        model = RobotModel.of(robot)
+        return self._with(model.name, **{_FOR_ROBOT: model.model_dump(mode="json")})
+
+    def with_camera(self, name: str) -> Scenario:
+        """Return the same scenario with another camera on the robot."""
+        return self._with(name, camera=camera_data(name)) if name else self
+
+    def with_networks(self, named: str | Path) -> Scenario:
+        """Return the same scenario with other networks for the pictures of its camera."""
+        return self._with(named, networks=networks_data(named)) if named else self
 
     def with_population(self, text: str) -> Scenario:
         """Return the same task among people with other habits.
@@ -317,14 +449,34 @@ class Scenario(SimConfig):
             text: a population, ``"classic"`` or ``"recorded"``, numbers of :class:`Hearing`, or
                 both: ``"recorded"``, ``"recorded,answers=0.8,startles=0.2"``, ``"answers=0.3"``.
         """
+        if not text:
+            return self
         name, numbers = population_of(text)
         changes: dict[str, Any] = {} if name is None else {"population": name}
         if numbers:
-            changes["hearing"] = self.hearing.with_numbers(numbers)
-        return self.model_copy(update=changes)
+            changes["hearing"] = {**self._keys.get("hearing", {}), **numbers}
+        return self._with(text, **changes)
+
+    def _with(self, what: object, **changes: Any) -> Scenario:
+        return self.from_data({**self._keys, **changes}, f"{self.name} with {what}")
 
     def without_people(self) -> Scenario:
         """Return the same task in a hall without people."""
         empty: dict[str, Any] = {"people": (), "replay_csv": None}
         empty |= {"replay_reacts": False, "replay_leaves": False}
         return self.model_copy(update={"name": f"{self.name}_without_people", **empty})
+
+
+def _robot_of(value: Any, source: str) -> RobotModel:
+    try:
+        return RobotModel.model_validate(value) if isinstance(value, dict) else RobotModel.of(value)
+    except ValidationError as cause:
+        raise SimError(f"{source}: {_FOR_ROBOT}: {error_text(cause)}") from cause
+
+
+def _uniform(key: list[int], path: str) -> float:
+    """Return a number in [0, 1) that depends only on the key and the path."""
+    digest = hashlib.sha256(path.encode()).digest()
+    words = [int.from_bytes(digest[at : at + 4], "little") for at in range(0, 16, 4)]
+    stream = np.random.default_rng(np.random.SeedSequence([*key, *words]))
+    return float(stream.random())

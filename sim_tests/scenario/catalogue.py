@@ -24,7 +24,6 @@ from ..world.errors import SimError
 from ._distributions import Choice, Distribution
 from ._files import SCENARIO_SETS, shipped_scenarios
 from ._scenario import RobotTask, Scenario
-from ._template import ScenarioTemplate, shipped_templates
 
 #: Robot and person are in conflict if their centres would come closer than this.
 CONFLICT_M: Final = 1.0
@@ -123,12 +122,12 @@ class ApproachStatistics:
     draws: int
 
 
-def approach_statistics(template: ScenarioTemplate, draws: int = 200) -> ApproachStatistics | None:
+def approach_statistics(scenario: Scenario, draws: int = 200) -> ApproachStatistics | None:
     """Return the statistics over seeds 0, 1, …; None for a scenario without planned people."""
-    varies = bool(template.parameters())
+    varies = bool(scenario.distributions)
     closest = []
     for seed in range(draws if varies else 1):
-        approaches = closest_approaches(template.for_seed(seed))
+        approaches = closest_approaches(scenario.draw(seed))
         if not approaches:
             return None
         closest.append(min(approaches.values()))
@@ -141,12 +140,12 @@ def approach_statistics(template: ScenarioTemplate, draws: int = 200) -> Approac
     )
 
 
-def template_problems(template: ScenarioTemplate) -> tuple[str, ...]:
+def drawn_problems(scenario: Scenario) -> tuple[str, ...]:
     """Return what makes draws of a scenario impossible, each with the first seed that shows it."""
     first: dict[str, str] = {}
-    for seed in range(CHECKED_DRAWS if template.parameters() else 1):
+    for seed in range(CHECKED_DRAWS if scenario.distributions else 1):
         try:
-            found = scenario_problems(template.for_seed(seed))
+            found = scenario_problems(scenario.draw(seed))
         except SimError as error:
             found = (str(error),)
         for problem in found:
@@ -229,57 +228,53 @@ def _within(place_m: tuple[float, float], boxes: FloatArray, clearance_m: float)
 
 def list_command(*, as_json: bool = False) -> int:
     """Print the shipped scenarios, set by set."""
-    sets = {name: shipped_templates(name) for name in SCENARIO_SETS}
+    sets = {name: [*map(Scenario.shipped, shipped_scenarios(name))] for name in SCENARIO_SETS}
     if as_json:
-        rows = [_list_row(each, name) for name, templates in sets.items() for each in templates]
+        rows = [_list_row(each, name) for name, scenarios in sets.items() for each in scenarios]
         print(json_text(rows), end="")
         return 0
-    width = max(len(template.id) for templates in sets.values() for template in templates)
-    for name, templates in sets.items():
+    width = max(len(scenario.id) for scenarios in sets.values() for scenario in scenarios)
+    for name, scenarios in sets.items():
         print(f"{'' if name == SCENARIO_SETS[0] else chr(10)}--scenario {name}")
         print(f"{'scenario':{width}}  attention  people  varies")
-        for template in templates:
-            scenario = template.median()
-            people = len(scenario.people)
-            print(f"{template.id:{width}}  {template.attention:9}  {people:6}", end="")
-            print(f"  {len(template.parameters()):6}")
-            print(textwrap.indent(textwrap.fill(template.description, 76), "    "))
+        for scenario in scenarios:
+            counts = f"{len(scenario.people):6}  {len(scenario.distributions):6}"
+            print(f"{scenario.id:{width}}  {scenario.attention:9}  {counts}")
+            print(textwrap.indent(textwrap.fill(scenario.description, 76), "    "))
     return 0
 
 
-def _list_row(template: ScenarioTemplate, scenario_set: str) -> dict[str, Any]:
-    scenario = template.median()
+def _list_row(scenario: Scenario, scenario_set: str) -> dict[str, Any]:
     return {
         "set": scenario_set,
-        "name": template.name,
-        "version": template.version,
-        "attention": template.attention,
+        "name": scenario.name,
+        "version": scenario.version,
+        "attention": scenario.attention,
         "people": len(scenario.people),
-        "varies": len(template.parameters()),
-        "description": template.description,
+        "varies": len(scenario.distributions),
+        "description": scenario.description,
     }
 
 
 def show_command(name: str, *, yaml: bool, seed: int | None) -> int:
     """Print one scenario, in words or as YAML."""
-    template = ScenarioTemplate.named(name)
+    scenario = Scenario.named(name)
     if seed is not None and not yaml:
         raise SimError("--seed needs --yaml: the description covers all draws of a scenario")
     if yaml:
-        text = template.to_text() if seed is None else template.for_seed(seed).to_text()
+        text = scenario.to_text() if seed is None else scenario.draw(seed).to_text()
         print(text, end="")
     else:
-        print("\n".join(description_lines(template)))
+        print("\n".join(description_lines(scenario)))
     return 0
 
 
-def description_lines(template: ScenarioTemplate) -> list[str]:
+def description_lines(scenario: Scenario) -> list[str]:
     """Return the description: the task, the people, what varies, and the closest approach."""
-    scenario = template.median()
     task = scenario.robot
     lines = [
-        f"{template.id} ({template.attention})",
-        template.description,
+        f"{scenario.id} ({scenario.attention})",
+        scenario.description,
         "",
         f"robot   from ({task.start_x_m:g}, {task.start_y_m:g}) m to ({task.goal_x_m:g}, "
         f"{task.goal_y_m:g}) m within {scenario.duration_s:g} s",
@@ -287,14 +282,14 @@ def description_lines(template: ScenarioTemplate) -> list[str]:
     ]
     if scenario.replay_csv is not None:
         lines.append(f"replay  {scenario.replay_csv}")
-    if template.parameters():
+    if scenario.distributions:
         lines += ["", "varies"]
-        width = max(map(len, template.parameters()))
+        width = max(map(len, scenario.distributions))
         lines += [
             f"  {path:{width}}  {distribution_text(distribution)}"
-            for path, distribution in template.parameters().items()
+            for path, distribution in scenario.distributions.items()
         ]
-    statistics = approach_statistics(template)
+    statistics = approach_statistics(scenario)
     if statistics is not None:
         draws = "the scenario" if statistics.draws == 1 else f"{statistics.draws} draws"
         lines += [

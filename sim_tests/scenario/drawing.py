@@ -24,7 +24,6 @@ from perception.arrays import FloatArray
 from ..actors.behaviour import PersonSpec, RecordedPath, read_recordings
 from ..world.errors import SimError
 from ._scenario import Scenario
-from ._template import ScenarioTemplate
 from .catalogue import closest_approaches, person_plan, planned_people, robot_plan
 
 _FORMATS: Final = (".png", ".svg", ".pdf")
@@ -50,18 +49,17 @@ def draw_scenario(name: str, out: Path) -> None:
     """Draw a scenario, a shipped one or a YAML file, into a picture, and print its path."""
     if out.suffix.lower() not in _FORMATS:
         raise SimError(f"--out must end in {', '.join(_FORMATS)}, got {out}")
-    save_figure(scenario_figure(ScenarioTemplate.named(name)), out)
+    save_figure(scenario_figure(Scenario.named(name)), out)
     print(f"\nWritten: {out}")
 
 
-def scenario_figure(template: ScenarioTemplate) -> Figure:
+def scenario_figure(scenario: Scenario) -> Figure:
     """Return the drawing of a scenario at its medians, with thin lines for other draws.
 
     People and robot stand where they would be 1.5 s before their closest approach if nobody
     reacted. Dots are 2 s apart. A sector of ±60° shows the gaze of a person: dashed while they
     glance at the robot. Recorded people are shown as their paths.
     """
-    scenario = template.median()
     recorded = () if scenario.replay_csv is None else read_recordings(scenario.replay_csv)
     people = planned_people(scenario)
     x_min, y_min, x_max, y_max = _window(scenario, people, recorded)
@@ -75,16 +73,16 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
         axis.set_major_locator(MultipleLocator(2.0))
     axes.set_xlabel("x, odom (m)")
     axes.set_ylabel("y (m)")
-    axes.set_title(template.id, loc="left", fontweight="bold", fontsize=10)
-    axes.set_title(template.attention, loc="right", fontsize=9, color=_FAINT)
+    axes.set_title(scenario.id, loc="left", fontweight="bold", fontsize=10)
+    axes.set_title(scenario.attention, loc="right", fontsize=9, color=_FAINT)
     for corners in _hall_corners(scenario):
         axes.add_patch(Polygon(corners, fc=_RACK, ec=_FAINT, lw=0.6))
     approaches = closest_approaches(scenario).values()
     now_s = max(min(approaches)[1] - _BEFORE_S, 0.0) if approaches else 0.0
     robot_m = _draw_robot(axes, scenario, now_s)
-    if template.parameters():
+    if scenario.distributions:
         for seed in range(_DRAWS):
-            for spec in template.for_seed(seed).people:
+            for spec in scenario.draw(seed).people:
                 axes.plot(*_route(spec).T, color=_looks(spec)[0], lw=0.5, alpha=0.35)
     for spec in people:
         _draw_person(axes, spec, now_s, robot_m)

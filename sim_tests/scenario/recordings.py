@@ -19,7 +19,7 @@ from tracking.people import FASTEST_MPS
 
 from ..actors.robot import NOVA_CARTER
 from ..world.errors import SimError
-from ._template import ScenarioTemplate
+from ._scenario import Scenario
 from .catalogue import robot_plan
 
 _Point = tuple[float, float]
@@ -265,10 +265,10 @@ def scenario_from_recording(
     _check_goal(start, goal, people)
     data = _scenario_data(table, people_file.name, people, (start, goal), options)
     text = yaml_text(data, width=100)
-    template = ScenarioTemplate.from_text(text, str(out))
+    scenario = Scenario.from_text(text, str(out))
     _write_people(people_file, people)
     write_text(out, text, SimError)
-    return ConvertedRecording(out, people_file, _remarks(recorded, people, template))
+    return ConvertedRecording(out, people_file, _remarks(recorded, people, scenario))
 
 
 def _check_options(options: RecordingOptions) -> None:
@@ -451,12 +451,11 @@ def _write_people(path: Path, people: list[RecordedTrack]) -> None:
 
 
 def _remarks(
-    recorded: RecordedTable, people: list[RecordedTrack], template: ScenarioTemplate
+    recorded: RecordedTable, people: list[RecordedTrack], scenario: Scenario
 ) -> tuple[str, ...]:
     """Return what was read and made, one sentence each."""
-    scenario = template.median()
     task, hall = scenario.robot, scenario.layout
-    found = [template.description]
+    found = [scenario.description]
     if recorded.filled_gaps or recorded.long_gaps or recorded.lone_rows:
         found.append(
             f"Gaps: {recorded.filled_gaps} of at most 0.5 s filled; at {recorded.long_gaps} longer "

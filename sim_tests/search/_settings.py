@@ -24,9 +24,9 @@ from ..conditions import (
     refuse_unused_networks,
 )
 from ..crossing import named_policy
-from ..scenario import ScenarioTemplate
+from ..scenario import Scenario
 from ..study.measures import EpisodeRecord, nondeterminism_notes
-from ..study.runs import Job, Workers, attempt, died, held, named_templates, policy_text
+from ..study.runs import Job, Workers, attempt, died, held, named_scenarios, policy_text
 from ..world.bullet import require_pybullet
 from ..world.errors import SimError
 
@@ -43,7 +43,7 @@ class SearchSettings:
     Attributes:
         policy_name: name of the policy in tables.
         policy: YAML of the policy.
-        scenarios: YAML of the templates.
+        scenarios: YAML of each.
         episodes: number of episodes; the search says of what.
         perception: as for :func:`sim_tests.run_crossing`, such as ``"keypoints+scanner"``.
         planner: ``"module:Class"``, empty for the reference planner.
@@ -61,20 +61,20 @@ class SearchSettings:
     generation: int
 
     @property
-    def templates(self) -> tuple[ScenarioTemplate, ...]:
+    def all_scenarios(self) -> tuple[Scenario, ...]:
         """All scenarios."""
-        return tuple(ScenarioTemplate.from_text(text) for text in self.scenarios)
+        return tuple(Scenario.from_text(text) for text in self.scenarios)
 
 
 def common_settings(experiment: Experiment) -> dict[str, Any]:
     """Return the settings of an experiment, but for the episodes and the generation."""
     name, own_policy = named_policy(experiment.one("policy"))
     refuse_unused_networks(experiment.changes, experiment["perception"])
-    templates = named_templates(experiment["scenario"], **experiment.changes)
+    scenarios = named_scenarios(experiment["scenario"], **experiment.changes)
     return {
         "policy_name": name,
         "policy": policy_text(own_policy),
-        "scenarios": tuple(each.to_text() for each in templates),
+        "scenarios": tuple(each.to_text() for each in scenarios),
         "perception": Perception.of(experiment["perception"], experiment.one("sensors")).name,
         "planner": experiment.one("planner"),
         "seed": experiment["seed"],

@@ -10,24 +10,17 @@ from pathlib import Path
 import pytest
 
 from awarenav.baseline import read_baseline
-from benchmarks.adapter import CYCLE, cost_ms
-from benchmarks.adapter import main as adapter
 from benchmarks.episode_cost import main as episode_cost
-
-
-def test_every_step_of_the_adapter_has_a_cost_of_its_own() -> None:
-    cost = cost_ms(3, 8, 1, 0)
-    assert set(cost) == {*CYCLE, "painter"}
-    assert all(milliseconds > 0.0 for milliseconds in cost.values())
+from benchmarks.people.__main__ import main as people
 
 
 @pytest.mark.parametrize(
     ("main", "arguments", "message"),
     [
-        (adapter, ["--frames", "0"], "must be a whole number of at least 1, got '0'"),
-        (adapter, ["--seed", "-3"], "--seed must be 0 or more, got -3"),
-        (adapter, ["--out", "no/such/folder/x.json"], "a folder that exists"),
-        (adapter, ["--baseline", "HERE/broken.json"], "is not a baseline"),
+        (people, ["--crowds", "0"], "must be a whole number of at least 1, got '0'"),
+        (people, ["--seed", "-3"], "--seed must be 0 or more, got -3"),
+        (people, ["--out", "no/such/folder/x.json"], "a folder that exists"),
+        (people, ["--baseline", "HERE/broken.json"], "is not a baseline"),
         (episode_cost, ["--against", "HERE"], "must be a checkout with sim_tests"),
     ],
 )

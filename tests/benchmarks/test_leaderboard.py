@@ -21,7 +21,7 @@ from benchmarks.leaderboard import (
 from benchmarks.leaderboard._page import ROBOTS, Standing
 from benchmarks.leaderboard._results import PAGES, figures, over_scenarios, times, with_figures
 from sim_tests import SimError
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.study.measures import EpisodeRecord
 from sim_tests.study.runs import run_episode
 
@@ -37,7 +37,7 @@ def test_a_committed_episode_is_measured_again_and_the_same(name, scenario):
     (was,) = (
         each for each in read_results(_BOARD, row) if (each.scenario, each.seed) == (scenario, 0)
     )
-    (job,) = row.jobs([ScenarioTemplate.shipped(scenario)], [0])
+    (job,) = row.jobs([Scenario.shipped(scenario)], [0])
     now = run_episode(job)
     for field in ("robot_contacts", "person_contacts", "success", "error"):
         assert getattr(now, field) == getattr(was, field), field
@@ -52,7 +52,7 @@ def test_the_page_is_made_from_the_committed_results():
 
 def test_every_file_of_results_belongs_to_a_row_and_the_best_rows_are_whole():
     assert {path.stem for path in RESULTS.glob("*.csv")} <= {row.name for row in _BOARD.rows}
-    planned = len(_BOARD.templates) * _BOARD.seeds
+    planned = len(_BOARD.all_scenarios) * _BOARD.seeds
     for row in _BOARD.rows:
         assert len(read_results(_BOARD, row)) <= planned
     assert len(read_results(_BOARD, _BOARD.named(_BOARD.baseline))) == planned
@@ -189,7 +189,7 @@ def test_networks_of_a_row_see_pixels_and_belong_to_it(tmp_path):
     networks.write_text("head: pnp")
     plain = Row(name="mine", policy="balanced", sensors="camera+scanner")
     row = plain.model_copy(update={"networks": str(networks)})
-    (job,) = row.jobs([ScenarioTemplate.shipped("blind_corner")], [0])
+    (job,) = row.jobs([Scenario.shipped("blind_corner")], [0])
     assert (job.perception, job.networks) == ("pixels+scanner", "real")
     assert row.senses == "camera+scanner with real"
     digests = [plain.digest, row.digest]

@@ -117,15 +117,3 @@ def test_a_good_installation_needs_no_scan(installed: Any) -> None:
     folder = installed.site.relative_to(installed.folder).as_posix()
     done = installed.python(GUARD_ALONE.replace("FOLDER", folder))
     assert done.returncode == 0, done.stderr
-
-
-def test_every_package_runs_the_guard_before_it_imports_anything_of_ours(root: Path) -> None:
-    for name in ("tracking", "nav_adapter", "awarenav", "sim_tests"):
-        lines = (root / name / "__init__.py").read_text().splitlines()
-        guard = next(number for number, line in enumerate(lines) if "require_sole_owner" in line)
-        first = next(
-            number
-            for number, line in enumerate(lines)
-            if line.lstrip().startswith(("from .", "from awarenav", "from perception"))
-        )
-        assert guard < first, name

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, PerceptionError
+from perception import AttentionCone
 
 coordinate = st.floats(-10.0, 10.0, allow_nan=False)
 point = st.tuples(coordinate, coordinate, coordinate).map(np.array)
@@ -40,43 +40,6 @@ def test_one_gaze_in_plain_floats_has_the_same_score(apex, gaze, target, angle, 
     assert in_floats == pytest.approx(float(cone.scores(apex, gaze, target, up)), abs=1e-9)
 
 
-def test_one_gaze_in_plain_floats_needs_a_direction():
-    with pytest.raises(PerceptionError, match="length 0"):
-        AttentionCone().score_of((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-
-
-@given(point, direction, point, half_angle, st.floats(0.1, 10.0), st.integers(0, 2**31))
-def test_score_is_invariant_to_motion_scale_and_gaze_length(
-    apex, gaze, target, angle, factor, seed
-):
-    cone = AttentionCone(angle)
-    alpha = cone.score(apex, gaze, target)
-    assert 0.0 <= alpha <= 1.0
-    # For a target at the apex, its direction is determined by rounding.
-    assume(np.linalg.norm(target - apex) > 1e-2)
-    turn = Rotation.random(random_state=seed).as_matrix()
-    moved = cone.score(turn @ apex + 3.0, turn @ gaze, turn @ target + 3.0)
-    assert moved == pytest.approx(alpha, abs=1e-6)
-    # α depends on angles only.
-    assert cone.score(factor * apex, factor * gaze, factor * target) == pytest.approx(
-        alpha, abs=1e-6
-    )
-
-
-@given(half_angle, st.floats(0.0, 1.5), st.floats(0.0, 1.5))
-def test_score_falls_with_the_angle_off_axis_and_ends_at_the_edge(angle, first, second):
-    cone = AttentionCone(angle)
-
-    def at(off_axis):
-        return cone.score(np.zeros(3), [1, 0, 0], [math.cos(off_axis), math.sin(off_axis), 0])
-
-    near, far = sorted((first, second))
-    assert at(near) >= at(far) - 1e-12
-    assert at(0.0) == 1.0
-    assert at(min(angle * 1.001, math.pi)) == pytest.approx(0.0, abs=1e-9)
-    assert at(angle * 0.999) > 0.0
-
-
 @pytest.mark.parametrize(
     ("off_axis_deg", "alpha"), [(0.0, 1.0), (48.82, 0.34), (11.74, 0.88), (60.0, 0.0), (180.0, 0.0)]
 )
@@ -96,13 +59,9 @@ def test_scores_of_many_people_at_once_equal_those_one_by_one():
     one_target = cone.score(apexes, gazes, targets[0])
     assert one_target.shape == (50,)
     assert one_target[7] == cone.score(apexes[7], gazes[7], targets[0])
-
-
-def test_the_highest_score_of_several_points_of_the_robot_counts():
-    cone = AttentionCone()
-    parts = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    assert cone.score([0, 0, 0], [0, 1, 0], parts) == 1.0
-    assert cone.score([0, 0, 0], [0, 0, 1], parts) == 0.0
+    # Of several points of the robot the highest score counts.
+    parts = cone.score(apexes[7], gazes[7], targets)
+    assert parts == max(cone.score(apexes[7], gazes[7], each) for each in targets)
 
 
 def lowered(down_rad: float, yaw_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -170,14 +129,3 @@ def test_somebody_who_reads_a_phone_does_not_see_a_robot_3_m_away_but_a_level_he
     level = at(0.0)
     assert level == at(0.0, cone=AttentionCone.printed())
     assert at(-15.0) < level  # a raised head looks elsewhere too
-
-
-@pytest.mark.parametrize("raised", [(0.3, 0.2), (-0.1, 0.3), (0.1, 1.6), (0.1, math.nan)])
-def test_angles_of_a_lowered_head_must_rise(raised):
-    with pytest.raises(PerceptionError, match="raised_rad"):
-        AttentionCone(raised_rad=raised)
-
-
-def test_up_needs_a_direction_off_the_gaze():
-    with pytest.raises(PerceptionError, match="up"):
-        AttentionCone().score([0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0])

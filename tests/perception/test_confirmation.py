@@ -44,21 +44,17 @@ def test_the_score_grows_with_the_detectors_and_with_the_keypoints(first, second
     assert least <= RULE.score(detection(first), keypoints(high))
 
 
-@given(st.floats(0.01, CERTAIN - 1e-6), st.floats(0.01, 0.99))
-def test_the_odds_are_multiplied(score, seen):
-    found = RULE.score(detection(score), keypoints(seen))
+@given(
+    st.floats(0.01, CERTAIN - 1e-6), st.floats(0.01, 0.99), st.just(NEUTRAL) | st.floats(0.01, 0.99)
+)
+def test_the_odds_are_multiplied(score, seen, neutral):
+    found = KeypointConfirmation(neutral=neutral).score(detection(score), keypoints(seen))
 
     def odds(probability):
         return probability / (1.0 - probability)
 
-    wanted = odds(score) * (odds(seen) / odds(NEUTRAL)) ** WEIGHT
+    wanted = odds(score) * (odds(seen) / odds(neutral)) ** WEIGHT
     assert found == pytest.approx(wanted / (1.0 + wanted), rel=1e-6, abs=1e-9)
-
-
-@given(st.floats(0.01, 0.99), st.floats(0.01, 0.99))
-def test_the_neutral_point_of_another_pose_network_leaves_a_score_as_it_is(score, neutral):
-    rule = KeypointConfirmation(score_threshold=0.0, neutral=neutral)
-    assert rule.score(detection(score), keypoints(neutral)) == pytest.approx(score, abs=1e-9)
 
 
 def test_four_hidden_keypoints_do_not_count():

@@ -17,7 +17,7 @@ from perception import Camera, PerceptionError
 from perception.documents import parse_json, parse_yaml, read_json, yaml_text
 from perception.laser import MapCells
 from sim_tests import SimError
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from tracking import TrackerConfig, TrackingError
 
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text("-.0eE1")
@@ -51,7 +51,7 @@ def test_a_key_that_stands_twice_in_yaml_is_refused_with_both_lines(text: str, w
 )
 @pytest.mark.parametrize(
     ("read", "error"),
-    [(TrackerConfig.from_yaml, TrackingError), (ScenarioTemplate.from_yaml, SimError)],
+    [(TrackerConfig.from_yaml, TrackingError), (Scenario.from_yaml, SimError)],
 )
 def test_a_file_without_keys_is_refused_in_plain_words(
     read: Callable[[Path], object], error: type[Exception], text: str, what: str, tmp_path: Path
@@ -86,8 +86,7 @@ def test_a_key_that_stands_twice_in_json_is_refused(text: str | bytes, key: str)
     with pytest.raises(PerceptionError, match=f"^text has the key '{key}' twice$"):
         parse_json(text, "text", finite=True)
 
-
-def test_the_same_key_of_two_objects_is_no_repetition() -> None:
+    # The same key of two objects is no repetition.
     text = '[{"a": {"a": 1}}, {"a": [{"a": 2}]}]'
     assert parse_json(text, "t") == parse_yaml(text, "t") == [{"a": {"a": 1}}, {"a": [{"a": 2}]}]
 
@@ -102,7 +101,7 @@ def test_the_same_key_of_two_objects_is_no_repetition() -> None:
             TrackingError,
             "awareness: {missed_frame_s: 1,\n missed_frame_s: 2}\n",
         ),
-        (ScenarioTemplate.from_yaml, SimError, "name: a\nname: b\n"),
+        (Scenario.from_yaml, SimError, "name: a\nname: b\n"),
         (Camera.from_yaml, PerceptionError, "image_width: 640\nimage_width: 320\n"),
         (MapCells.from_yaml, PerceptionError, "resolution: 0.05\nresolution: 0.5\n"),
         (read_json, PerceptionError, '{"a": 1,\n"a": 2}'),

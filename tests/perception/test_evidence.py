@@ -107,12 +107,6 @@ def test_a_face_cut_off_by_the_border_does_not_count_as_turned_away(person, seen
     assert std < 0.05
 
 
-def test_the_head_estimators_probability_comes_before_the_scores():
-    head = head_at(seen=0.05)
-    assert judge_face(CAMERA, ALL, head, 0.3).seen == pytest.approx(0.05)
-    assert judge_face(CAMERA, with_scores(), head_at(seen=0.9), 0.3).seen == pytest.approx(0.9)
-
-
 def test_an_unknown_direction_is_evidence_of_the_back_of_a_head_only():
     """15° bound what a network may say of a face; keypoints without a network have no bound."""
     sure, unsure = (head_at(std_rad=math.radians(deg), seen=0.9) for deg in (14.9, 15.1))
@@ -175,6 +169,12 @@ def test_a_smaller_face_has_a_larger_standard_deviation():
     assert extra[1] < math.radians(1.0)
     far = head_at(distance_m=0.156 * CAMERA.fx_px / 4.0)
     assert judge_face(CAMERA, ALL, far, 0.3) == "face too small"
+    # One of twelve pixels is a weak measurement.
+    alpha, std = awareness_with_evidence(head_at(distance_m=0.156 * CAMERA.fx_px / 12.0))
+    near_alpha, near_std = awareness_with_evidence(head_at(distance_m=2.0))
+    assert std > 0.15
+    assert std > 8.0 * near_std
+    assert alpha - 1.28 * std < 0.5 < near_alpha - 1.28 * near_std
 
 
 def test_the_back_of_a_head_has_awareness_0_with_certainty():
@@ -183,15 +183,6 @@ def test_the_back_of_a_head_has_awareness_0_with_certainty():
     assert (alpha, std) == (0.0, pytest.approx(0.0, abs=1e-3))
     alpha, std = awareness_with_evidence(head_at(10.0, std_rad=0.6), with_scores(0, 0, 0, 1, 1))
     assert (alpha, std) == (0.0, pytest.approx(0.0, abs=1e-3))
-
-
-def test_a_face_of_twelve_pixels_is_a_weak_measurement():
-    small = head_at(distance_m=0.156 * CAMERA.fx_px / 12.0)
-    alpha, std = awareness_with_evidence(small)
-    near_alpha, near_std = awareness_with_evidence(head_at(distance_m=2.0))
-    assert std > 0.15
-    assert std > 8.0 * near_std
-    assert alpha - 1.28 * std < 0.5 < near_alpha - 1.28 * near_std
 
 
 # --- α and its standard deviation ----------------------------------------------------------------

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perception import PerceptionError
 from perception.no_view import FROZEN, LastFrames, why_no_view
 
 SIZE = (480, 640, 3)
@@ -130,8 +129,3 @@ def test_without_noise_a_frame_repeats_only_once_the_robot_has_moved(
     assert last.repeats(other, pose(3 + x, 4 + y, heading + turn)) is moved
     assert last.repeats(one, pose(3 + x, 4 + y, heading + turn)) is moved
     assert not last.repeats(one, here)
-
-
-def test_the_picture_before_is_refused_by_name() -> None:
-    with pytest.raises(PerceptionError, match=r"LastFrames.*got ndarray"):
-        why_no_view(noise(), noise(1))  # type: ignore[arg-type]

@@ -176,13 +176,6 @@ def test_a_head_that_two_skeletons_claim_belongs_to_the_better():
     assert without_disowned(claimed, None) is claimed
 
 
-def test_people_without_keypoints_lose_nothing():
-    person, detection = seen()
-    nobody = changed(person, scores=np.zeros(17))
-    assert reasons((nobody, detection), (nobody, detection)) == [None, None]
-    assert disowned_keypoints(CAMERA, (), (), 0.3) == []
-
-
 # --- heads that no neck carries -----------------------------------------------------------------
 
 
@@ -323,6 +316,10 @@ def test_without_shoulders_nothing_tells_whose_head_it_is():
 
 
 def test_people_without_head_or_skeleton_stay_as_they_are():
+    person, detection = seen()
+    nobody = changed(person, scores=np.zeros(17))
+    assert reasons((nobody, detection), (nobody, detection)) == [None, None]
+    assert disowned_keypoints(CAMERA, (), (), 0.3) == []
     one, head = with_head(body_yaw_rad=math.pi, head_yaw_rad=math.pi)
     assert reason_of(one, None) is None
     stolen = one._replace(disowned=SKELETON)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
@@ -38,7 +39,10 @@ from perception.laser import (
     observations_of,
 )
 from perception.networks import OnnxModel, OnnxSettings, rgb_image
+from perception.networks.faces import FaceMesh
 from perception.networks.heads import head_crop
+from perception.networks.small_faces import RetinaFace
+from perception.no_view import why_no_view
 from perception.shipped import (
     DETECTOR,
     shipped_head_pose_estimator,
@@ -57,7 +61,6 @@ from perception.surround import (
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 UP = [0.0, -1.0, 0.0]
 NAN, INF = math.nan, math.inf
-PERSON = PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), np.zeros(17), "coco")
 HEAD = HeadPose([0, 0, 1], np.eye(3), np.eye(6), 0.0)
 RING = ring_of_views(CAMERA, [0.0, 1.0])
 SHIPPED = shipped_model_path(DETECTOR)
@@ -134,7 +137,15 @@ TYPES: list[Refused] = [
     (lambda: CONE.score([0, 0, 0], [0, 0, 0], [1, 0, 0]), "gaze"),
     (lambda: CONE.score([0, 0, 0], [1, 0, 0], [NAN, 0, 0]), "target_m"),
     (lambda: CONE.score(np.zeros((3, 3)), np.ones((3, 3)), np.ones((4, 3))), "equal lengths"),
+    (lambda: CONE.score([0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]), "up"),
+    (lambda: CONE.score_of((0, 0, 0), (0, 0, 0), (1, 0, 0)), "length 0"),
     *((lambda angle=angle: AttentionCone(angle), "half_angle_rad") for angle in (0.0, 1.6, NAN)),
+    *(
+        (lambda pair=pair: AttentionCone(raised_rad=pair), "raised_rad")
+        for pair in ((0.3, 0.2), (-0.1, 0.3), (0.1, 1.6), (0.1, NAN))
+    ),
+    (lambda: Camera.from_fov(640, 480, 90), r"got 90; is it in degrees\?"),
+    (lambda: why_no_view(FRAME, FRAME), "LastFrames.*got ndarray"),
     (lambda: camera(fx_px=0.0), "fx_px"),
     (lambda: camera(fy_px=5e-324), r"fy_px must lie in \[1e-06, 1e\+09\], got 4.94066e-324"),
     (lambda: camera(width_px=0), "width_px"),
@@ -193,6 +204,12 @@ NETWORKS: list[Refused] = [
     (lambda: detector(family="yolo"), "family must be one of 'rtmdet', 'yolox', 'ultralytics'"),
     (lambda: detector(input_size_hw_px=320), "two whole numbers"),
     (lambda: head_crop(FRAME, (320.0, 240.0), 0.0), "side_px"),
+    (lambda: OnnxModel.shipped("face"), "'face'.*'person_detector'"),
+    (lambda: FaceMesh(b"no ZIP archive"), r"not MediaPipe's face_landmarker\.task"),
+    *(
+        (lambda file=file: RetinaFace(file), r"mobilenet0\.25_Final\.pth")
+        for file in (b"", b"no pickle", pickle.dumps(1, 2), pickle.dumps([], 2))
+    ),
     (lambda: OnnxModel(b"", sha256="g" * 64), "64 hexadecimal digits"),
     (lambda: OnnxModel(b"", sha256=7), "64 hexadecimal digits"),
     (lambda: OnnxSettings(()), "providers must be one or more of 'cpu', 'cuda', 'tensorrt'"),

@@ -57,22 +57,6 @@ def test_several_people_have_position_gaze_and_awareness_each():
         assert observation.box_xyxy_px is not None
 
 
-def test_the_position_is_that_of_the_body_and_not_of_the_nose():
-    person = person_at((0.0, 0.4, 3.0), body_yaw_rad=math.pi / 2)
-    (seen,) = processed(known(person, noise_px=0.0))
-    nose = person.points_camera_m[0]
-    assert np.linalg.norm(seen.position_camera_m - person.chest_camera_m) < 0.1
-    assert np.linalg.norm(seen.position_camera_m - nose) > 0.25
-
-
-def test_a_person_without_usable_keypoints_still_has_a_position():
-    person = person_at((0.5, 0.4, 4.0))
-    (seen,) = processed(known(person, seen=np.zeros(17)))
-    assert seen.awareness is None
-    assert np.linalg.norm(seen.position_camera_m - person.chest_camera_m) < 1.5
-    assert np.sqrt(seen.position_covariance_m2[2, 2]) > 0.5
-
-
 def test_a_person_who_looks_at_any_point_of_the_robot_is_aware():
     person = person_at((0.0, 0.4, 3.0), head_yaw_rad=math.radians(50.0))
     networks = known(person, noise_px=0.0)

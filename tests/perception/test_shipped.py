@@ -40,11 +40,14 @@ def copy(tmp_path):
 # --- content ------------------------------------------------------------------------------------
 
 
-def test_three_networks_are_shipped_and_small():
+def test_four_networks_are_shipped_small_and_alone():
     models = shipped_models()
     assert tuple(model.name for model in models) == NAMES
     assert sum(model.size_bytes for model in models) <= 20e6
     assert {model.licence for model in models} == {"Apache-2.0"}
+    expected = {"manifest.json"}
+    expected |= {f"{name}.{suffix}" for name in NAMES for suffix in ("onnx", "md")}
+    assert {path.name for path in FOLDER.iterdir() if path.suffix != ".part"} == expected
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -53,18 +56,14 @@ def test_the_file_the_manifest_and_the_card_agree(name):
     content = verify_shipped_model(name).read_bytes()
     assert (hashlib.sha256(content).hexdigest(), len(content)) == (model.sha256, model.size_bytes)
     card = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
-    for fact in ("sha256", "size_bytes", "licence", "input"):
+    assert model.training_domain in ("renders", "simulated scans")
+    assert OnnxModel.shipped(name).training_domain == model.training_domain
+    for fact in ("sha256", "size_bytes", "licence", "input", "training_domain"):
         assert re.findall(rf"^- {fact}: (.+)$", card, re.MULTILINE) == [str(getattr(model, fact))]
     assert re.findall(r"^## (.+)$", card, re.MULTILINE) == [
         *("File", "Data", "Recipe", "Figures", "Limits"),
     ]
     assert "Made for the simulator" in card
-
-
-def test_no_other_file_is_shipped():
-    expected = {"manifest.json"}
-    expected |= {f"{name}.{suffix}" for name in NAMES for suffix in ("onnx", "md")}
-    assert {path.name for path in FOLDER.iterdir() if path.suffix != ".part"} == expected
 
 
 @pytest.mark.parametrize("name", [POSE, HEAD])
@@ -118,23 +117,15 @@ def test_an_altered_file_is_refused_with_both_hashes_and_the_remedy(copy):
         assert part in str(refused.value)
 
 
-def test_a_missing_file_is_refused(copy):
+def test_a_missing_file_is_refused_and_a_missing_provider_does_not_blame_it(copy):
     (copy / f"{HEAD}.onnx").unlink()
     with pytest.raises(PerceptionError, match=r"head_pose\.onnx is missing.*pip install"):
         OnnxModel.shipped(HEAD, folder=copy)
     with pytest.raises(PerceptionError, match="is missing"):
         shipped_model_path(HEAD, copy)
-
-
-def test_a_missing_provider_does_not_blame_the_file():
     with pytest.raises(PerceptionError, match="provider") as refused:
         OnnxModel.shipped(DETECTOR, OnnxSettings(providers=("tensorrt",)))
     assert "altered" not in str(refused.value)
-
-
-def test_an_unknown_name_is_refused_with_the_known_names():
-    with pytest.raises(PerceptionError, match=r"'face'.*'person_detector'"):
-        OnnxModel.shipped("face")
 
 
 @pytest.mark.parametrize(

@@ -224,12 +224,6 @@ def test_the_more_central_observation_is_kept_and_the_covariance_decides_about_p
         assert len(both) == people
 
 
-def test_two_observations_of_one_view_are_never_merged() -> None:
-    place = at(0.0, 2.0)
-    merged = merge_views(RING[:1], [[person(place), person(np.add(place, [0.1, 0.0, 0.0]))]])
-    assert [each.row for each in merged] == [0, 1]
-
-
 def test_a_box_of_a_view_is_mapped_to_the_image_of_the_lens() -> None:
     lens = PanoramaLens(1440, 720)
     corners = np.array([80.0, 30.0, 140.0, 130.0])

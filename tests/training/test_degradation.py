@@ -137,12 +137,9 @@ def test_random_degradations_reach_what_was_asked_and_leave_some_pictures_alone(
         ({"white_balance": (1.0, 0.0, 1.0)}, "white_balance must be three factors"),
     ],
 )
-def test_bad_effects_are_refused(values, message):
+def test_bad_effects_and_pictures_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
         Degradation(**values)
-
-
-def test_bad_pictures_are_refused():
     with pytest.raises(ValueError, match="must be uint8 of shape"):
         degrade(np.zeros((4, 4), np.uint8), Degradation(), np.random.default_rng(0))
     with pytest.raises(ValueError, match="scale must be finite and greater than 0"):

@@ -27,7 +27,7 @@ from awarenav.drawing import awareness_colour
 from awarenav.figures import Axes, Circle, Figure, Image, Polygon, new_figure
 from nav_adapter import NavAdapter, NavConstraints, RobotState
 from perception.anthropometry import BODY_RADIUS_M
-from sim_tests import NOVA_CARTER, ScenarioTemplate, run_crossing
+from sim_tests import NOVA_CARTER, Scenario, run_crossing
 from tracking import PersonTrack, PersonTracker
 
 ROOT: Final = Path(__file__).parents[2]
@@ -89,7 +89,7 @@ def record_example(name: str) -> Recording:
     with recorded() as recording, contextlib.redirect_stdout(io.StringIO()):
         if name in PLANNERS:
             make = getattr(import_module(f"examples.planners.{name}"), PLANNERS[name])
-            scenario = ScenarioTemplate.shipped("crossing_attentive").for_seed(0)
+            scenario = Scenario.shipped("crossing_attentive").draw(0)
             planner = make(NOVA_CARTER, static_boxes_odom_m=scenario.planner_boxes_odom_m)
             run_crossing(scenario, policy="balanced", planner=planner)
             return recording

@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from sim_tests.scenario import SCENARIO_SETS, ScenarioTemplate, shipped_scenarios
+from sim_tests.scenario import SCENARIO_SETS, Scenario, shipped_scenarios
 from sim_tests.scenario._files import shipped_text
 
 from .example_pictures import PLANNERS, ROOT, example_names
@@ -80,8 +80,8 @@ def gallery_page() -> str:
 
 def _scenario(name: str) -> str:
     """Return the entry of a scenario: its description, film and file."""
-    template = ScenarioTemplate.shipped(name)
-    about = f"### {name}\n\n{template.median().description} ({template.attention})"
+    scenario = Scenario.shipped(name)
+    about = f"### {name}\n\n{scenario.description} ({scenario.attention})"
     _, text = shipped_text(name)
     return _ENTRY.format(
         "\n\n".join([about, _FILM.format(name=name), _YAML.format(name=name, text=text.rstrip())])

@@ -45,9 +45,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are generated."""
     add = partial(_add, files, config)
-    written = {file.src_uri for file in files}
-    metrics = "reference/metrics.md" if "metrics.md" in written else "metrics.md"
-    for name, text in (reference.pages(metrics) | {gallery.PAGE: gallery.gallery_page()}).items():
+    for name, text in (reference.pages() | {gallery.PAGE: gallery.gallery_page()}).items():
         add(name, content=text)
     stem = notebook.NOTEBOOK.stem
     text, pictures = notebook.page(notebook.read(), stem)

@@ -73,7 +73,7 @@ classes: [AwarenessPipeline](perception.md#perception.AwarenessPipeline),
 - **Files**: keys of a [policy](policy-keys.md), a [scenario](scenario-keys.md), a
   [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md)
   and [rendered sets](render-keys.md)
-- **[Metrics]({metrics})** and columns of `episodes.csv`
+- **[Metrics](../metrics.md)** and columns of `episodes.csv`
 - **[ROS 2 topics](topics.md)** of the bridge
 """
 _COMMANDS: Final = """# Commands
@@ -240,26 +240,19 @@ SETTINGS_PAGES: Final = {
 }
 
 
-def pages(metrics: str) -> dict[str, str]:
-    """Return the Markdown of every generated page of the reference, by its path on the site.
-
-    Args:
-        metrics: path of the page of metrics.
-    """
+def pages() -> dict[str, str]:
+    """Return the Markdown of every generated page of the reference, by its path on the site."""
     homes: dict[type[BaseModel], str] = {}
     settings = {
         f"reference/{name}.md": page.markdown(name, homes) for name, page in SETTINGS_PAGES.items()
     }
-    in_reference = metrics.removeprefix("reference/")
     return {
-        "reference/index.md": _INDEX.format(
-            metrics=in_reference if in_reference != metrics else f"../{metrics}"
-        ),
+        "reference/index.md": _INDEX,
         **{f"reference/{package}.md": package_page(package) for package in PACKAGES},
         "reference/awarenav.md": front_door_page(),
         "reference/commands.md": _COMMANDS,
         **settings,
-        metrics: metrics_page(),
+        "metrics.md": metrics_page(),
         "reference/topics.md": topics_page(),
     }
 

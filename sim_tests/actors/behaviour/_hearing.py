@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
-
-from tracking.config import complaints
+from pydantic import Field, model_validator
 
 from ...world.config import SimConfig
-from ...world.errors import SimError
 
 StartleKind = Literal["", "stop", "aside", "into_path"]
 RequestMeans = Literal["light", "voice"]
@@ -87,17 +83,6 @@ class Hearing(SimConfig):
         """The numbers that are not the default, as ``--population`` takes them."""
         changed = self.model_dump(exclude_defaults=True)
         return ",".join(f"{key}={value:g}" for key, value in changed.items())
-
-    def with_numbers(self, numbers: Mapping[str, float]) -> Hearing:
-        """Return the figures with other numbers.
-
-        Raises:
-            SimError: for unknown ones, and values that are not possible together.
-        """
-        try:
-            return Hearing.model_validate({**self.model_dump(), **numbers})
-        except ValidationError as cause:
-            raise SimError(f"hearing: {complaints(cause)}") from cause
 
     def activity_factor(self, activity: str) -> float:
         """Return the factor of an activity."""

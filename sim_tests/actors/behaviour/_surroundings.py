@@ -205,3 +205,10 @@ class PersonOutcome:
     length_m: float = 0.0
     free_length_m: float | None = None
     late_s: float | None = None
+
+    @property
+    def delay_s(self) -> float | None:
+        """Delay by the robot, so far for somebody on the way; None where it is not known."""
+        if self.time_s is None or self.free_time_s is None:
+            return self.late_s
+        return self.time_s - self.free_time_s

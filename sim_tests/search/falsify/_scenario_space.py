@@ -13,7 +13,7 @@ from tracking.config import complaints
 
 from ...actors.behaviour import FASTEST_RECORDED_MPS, PersonSpec, median_person
 from ...actors.robot import NOVA_CARTER
-from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
+from ...scenario import Choice, Distribution, Integers, Scenario
 from ...world.errors import SimError
 from .._study import Range
 from ._parameters import (
@@ -52,26 +52,25 @@ class ScenarioSpace:
     parameters as in the classic one.
 
     Args:
-        template: the scenario.
+        scenario: the scenario as written.
         people: number of people that are varied, in the stage's order.
         asks: the robot asks for attention, so how the varied people answer is varied as well
             (:func:`hearing_parameters`).
     """
 
-    def __init__(self, template: ScenarioTemplate, people: int = 2, *, asks: bool = False) -> None:
-        self.template = template
-        median = template.median()
-        self._median: dict[str, Any] = median.model_dump(mode="json")
-        self._boxes = median.layout.obstacle_boxes_odom
-        reach_m = median.robot_profile.circumscribed_radius_m
+    def __init__(self, scenario: Scenario, people: int = 2, *, asks: bool = False) -> None:
+        self.written = scenario
+        self._median: dict[str, Any] = scenario.model_dump(mode="json")
+        self._boxes = scenario.layout.obstacle_boxes_odom
+        reach_m = scenario.robot_profile.circumscribed_radius_m
         self._longer_m = max(reach_m - NOVA_CARTER.circumscribed_radius_m, 0.0)
         self._asks = asks
-        self._is_recorded = median.population == "recorded"
+        self._is_recorded = scenario.population == "recorded"
         self._varied = range(min(people, len(self._median["people"])))
         if not self._varied:
-            raise SimError(f"scenario {template.name!r} has no people to vary")
+            raise SimError(f"scenario {scenario.name!r} has no people to vary")
         self._take_medians(self._median)
-        self._distributions = template.parameters()
+        self._distributions = scenario.distributions
         self.parameters: dict[str, Parameter] = {}
         for row in self._varied:
             for name, parameter in self._own_parameters(row).items():
@@ -93,7 +92,7 @@ class ScenarioSpace:
         return {name: each.neutral for name, each in self.parameters.items()}
 
     def scenario(self, values: Mapping[str, float]) -> Scenario:
-        """Return the possible variation nearest to these values; its name is the template's."""
+        """Return the possible variation nearest to these values; it keeps the name."""
         for share in _SHARES:
             shared = {
                 name: each.neutral + share * (values[name] - each.neutral)
@@ -106,7 +105,7 @@ class ScenarioSpace:
                 except ValidationError as cause:
                     if share == 0.0:
                         raise SimError(
-                            f"scenario {self.template.name!r}: {complaints(cause)}"
+                            f"scenario {self.written.name!r}: {complaints(cause)}"
                         ) from cause
         raise AssertionError  # pragma: no cover - the last share always returns or raises
 
@@ -115,7 +114,7 @@ class ScenarioSpace:
             path: _distribution_value(each, values[path])
             for path, each in self._distributions.items()
         }
-        data: dict[str, Any] = self.template.with_values(drawn).model_dump(mode="json")
+        data: dict[str, Any] = self.written.with_values(drawn).model_dump(mode="json")
         data["start_jitter_s"] = 0.0
         self._take_medians(data)
         for row in self._varied:

@@ -94,7 +94,7 @@ class SearchedEpisode:
     """One episode of a search.
 
     Attributes:
-        scenario: name of the template.
+        scenario: its name.
         round: number of the round; every restart begins one.
         trial: the trial of that round; its value is the :func:`score`.
     """
@@ -254,11 +254,11 @@ def falsify(
     Raises:
         SimError: settings that do not fit together, or another process that works in the folder.
     """
-    templates = settings.templates
+    scenarios = settings.all_scenarios
     asks = policy_of(settings.policy).attention is not None
-    spaces = {each.name: ScenarioSpace(each, settings.people, asks=asks) for each in templates}
+    spaces = {each.name: ScenarioSpace(each, settings.people, asks=asks) for each in scenarios}
     budget = Budget.of(settings.episodes, len(spaces), settings.generation)
-    refuse_unusable_planner(settings.planner, templates[0].median())
+    refuse_unusable_planner(settings.planner, scenarios[0])
     held = search_folder(
         settings,
         folder / _SETTINGS_FILE,
@@ -317,10 +317,10 @@ def _evaluated(
     trials: Mapping[int, ParameterValues],
 ) -> list[Outcome]:
     """Return the outcomes of variations of one scenario, given their parameters by number."""
-    runner.bar.set_postfix_str(space.template.name)
+    runner.bar.set_postfix_str(space.written.name)
     points = list(trials.values())
     records = runner.run(
-        [json.dumps([space.template.name, each], sort_keys=True) for each in points],
+        [json.dumps([space.written.name, each], sort_keys=True) for each in points],
         lambda row: settings.job(space.scenario(points[row])),
     )
     return [

@@ -17,7 +17,7 @@ from perception.documents import yaml_text
 
 from ...conditions import Perception
 from ...crossing import CrossingResult
-from ...scenario import Scenario, ScenarioTemplate
+from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
 from ...study.runs import observed_episode
 from ...world.errors import SimError
@@ -95,7 +95,7 @@ def write_worst(falsification: Falsification, folder: Path, most: int) -> list[W
         path = folder / f"worst_{number:03d}.yaml"
         text = yaml_text(scenario.model_copy(update=about).model_dump(mode="json"))
         write_text(path, _header(episode, settings, path.name) + text, SimError)
-        written = ScenarioTemplate.from_yaml(path).median()
+        written = Scenario.from_yaml(path)
         result, record = observed_episode(settings.job(written))
         cases.append(WorstCase(episode, path, written, result, record))
     return cases

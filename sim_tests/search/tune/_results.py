@@ -13,7 +13,7 @@ from awarenav.files import csv_number, write_csv, write_text
 
 from ...actors.behaviour import DEFAULT_POPULATION
 from ...conditions import Experiment
-from ...scenario import ScenarioTemplate
+from ...scenario import Scenario
 from ...study.measures import Interval
 from ...study.runs import policy_text
 from ...world.errors import SimError
@@ -55,13 +55,13 @@ def run_tune(
     The other options are fields of :class:`TuneSettings`, by their names.
     """
     common = common_settings(experiment)
-    templates = [ScenarioTemplate.from_text(text) for text in common["scenarios"]]
+    scenarios = [Scenario.from_text(text) for text in common["scenarios"]]
     searched = shipped_ranges() if ranges is None else read_ranges(ranges)
     settings = TuneSettings(
         **common,
         **fields,
         ranges={key: each.model_dump(mode="json") for key, each in searched.items()},
-        hold_out_scenarios=held_out_scenarios(templates),
+        hold_out_scenarios=held_out_scenarios(scenarios),
     )
     given = {
         "--policy": experiment.one("policy"),
@@ -265,7 +265,7 @@ def _header(tuning: Tuning, candidate: Candidate, name: str) -> str:
 
 def _others(tuning: Tuning) -> str:
     """Return robots, populations and hearing that are not the default."""
-    medians = [template.median() for template in tuning.settings.templates]
+    medians = tuning.settings.all_scenarios
     robots = {each.robot_model.name for each in medians if each.robot_model is not None}
     populations = {each.population for each in medians} - {DEFAULT_POPULATION}
     words = [f"robot {name}" for name in sorted(robots)]
@@ -275,7 +275,7 @@ def _others(tuning: Tuning) -> str:
 
 
 def _scenarios(tuning: Tuning) -> list[str]:
-    return [template.id for template in tuning.settings.templates]
+    return [scenario.id for scenario in tuning.settings.all_scenarios]
 
 
 def _ends(seeds: range) -> str:
@@ -332,7 +332,7 @@ def _draw_trials(axes: Axes, tuning: Tuning) -> None:
     settings = tuning.settings
     axes.set_title(
         f"{counted(len(tuning.trials), 'trial')} in "
-        f"{counted(len(settings.tuning_templates), 'scenario')}, "
+        f"{counted(len(settings.tuning_scenarios), 'scenario')}, "
         f"{counted(settings.episodes, 'seed')} each unless it ended early",
         loc="left",
         fontsize=10,

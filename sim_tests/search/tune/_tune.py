@@ -14,7 +14,7 @@ from nav_adapter import AwarenessPolicy
 
 from ...conditions import Perception
 from ...crossing import named_policy
-from ...scenario import ScenarioTemplate
+from ...scenario import Scenario
 from ...study.frontier import TODAY, sensors_of_today
 from ...study.measures import Interval
 from ...study.runs import Job, plan_jobs, policy_of
@@ -71,9 +71,11 @@ class TuneSettings(SearchSettings):
     requests: float | None = None
 
     @property
-    def tuning_templates(self) -> tuple[ScenarioTemplate, ...]:
+    def tuning_scenarios(self) -> tuple[Scenario, ...]:
         """Scenarios by which trials are judged."""
-        return tuple(each for each in self.templates if each.name not in self.hold_out_scenarios)
+        return tuple(
+            each for each in self.all_scenarios if each.name not in self.hold_out_scenarios
+        )
 
     @property
     def tuning_seeds(self) -> range:
@@ -95,7 +97,7 @@ class TuneSettings(SearchSettings):
         name: str,
         policy: AwarenessPolicy,
         seeds: Sequence[int],
-        templates: Sequence[ScenarioTemplate],
+        scenarios: Sequence[Scenario],
     ) -> tuple[Job, ...]:
         """Return the episodes of a policy: every seed in every one of some scenarios.
 
@@ -104,7 +106,7 @@ class TuneSettings(SearchSettings):
         perception = Perception.named(self.perception)
         sensors = perception.sensors
         return plan_jobs(
-            templates,
+            scenarios,
             [(name, policy)],
             seeds,
             planners=[self.planner],
@@ -114,13 +116,13 @@ class TuneSettings(SearchSettings):
         )
 
 
-def held_out_scenarios(templates: Sequence[ScenarioTemplate]) -> tuple[str, ...]:
+def held_out_scenarios(scenarios: Sequence[Scenario]) -> tuple[str, ...]:
     """Return the names of the scenarios that no trial runs: every third, the second of three first.
 
     They are in the order of what people look at (attentive, mixed, unaware) and of the names. Of
     fewer than three scenarios none is held out.
     """
-    names = [each.name for each in sorted(templates, key=lambda each: (each.attention, each.name))]
+    names = [each.name for each in sorted(scenarios, key=lambda each: (each.attention, each.name))]
     return tuple(names[1::3]) if len(names) >= 3 else ()
 
 
@@ -222,7 +224,7 @@ def tune(
         first=space.base_parameters(),
     )
     # Refuses what cannot be run.
-    settings.jobs(settings.policy_name, base, settings.tuning_seeds, settings.templates)
+    settings.jobs(settings.policy_name, base, settings.tuning_seeds, settings.all_scenarios)
     anchors = _anchors(settings.policy_name, base)
     held = search_folder(
         settings,
@@ -272,7 +274,7 @@ class _Race:
     def planned_episodes(self) -> int:
         """The number of episodes at most."""
         settings, anchors = self.settings, len(self.anchors)
-        per_trial = settings.episodes * len(settings.tuning_templates)
+        per_trial = settings.episodes * len(settings.tuning_scenarios)
         per_held_out = settings.held_out * len(settings.scenarios)
         return per_trial * (settings.trials + anchors) + per_held_out * (anchors + len(PLACES))
 
@@ -346,7 +348,7 @@ class _Race:
             evaluation = self.tuned[anchor]
         else:
             for seeds in stages(settings.tuning_seeds):
-                part = self._evaluate(_label(number), policy, seeds, settings.tuning_templates)
+                part = self._evaluate(_label(number), policy, seeds, settings.tuning_scenarios)
                 if part.errors:
                     # Episodes without a result must not make a policy look better.
                     return Outcome(None, notes={"error": part.errors[0]})
@@ -373,21 +375,21 @@ class _Race:
 
     def _tuned(self, name: str, policy: AwarenessPolicy) -> Evaluation:
         settings = self.settings
-        return self._evaluate_all(name, policy, settings.tuning_seeds, settings.tuning_templates)
+        return self._evaluate_all(name, policy, settings.tuning_seeds, settings.tuning_scenarios)
 
     def _held_out(self, name: str, policy: AwarenessPolicy) -> Evaluation:
         settings = self.settings
-        return self._evaluate_all(name, policy, settings.held_out_seeds, settings.templates)
+        return self._evaluate_all(name, policy, settings.held_out_seeds, settings.all_scenarios)
 
     def _evaluate_all(
         self,
         name: str,
         policy: AwarenessPolicy,
         seeds: range,
-        templates: Sequence[ScenarioTemplate],
+        scenarios: Sequence[Scenario],
     ) -> Evaluation:
         """Return the evaluation of a policy of which every episode has a result, or refuse it."""
-        parts = [self._evaluate(name, policy, part, templates) for part in stages(seeds)]
+        parts = [self._evaluate(name, policy, part, scenarios) for part in stages(seeds)]
         evaluation = Evaluation.joined(parts)
         if evaluation.errors:
             raise SimError(
@@ -401,9 +403,9 @@ class _Race:
         name: str,
         policy: AwarenessPolicy,
         seeds: range,
-        templates: Sequence[ScenarioTemplate],
+        scenarios: Sequence[Scenario],
     ) -> Evaluation:
-        jobs = self.settings.jobs(name, policy, seeds, templates)
+        jobs = self.settings.jobs(name, policy, seeds, scenarios)
         texts = (json.dumps(asdict(job), sort_keys=True) for job in jobs)
         keys = [hashlib.sha256(text.encode()).hexdigest() for text in texts]
         return Evaluation.of(self.runner.run(keys, jobs.__getitem__))

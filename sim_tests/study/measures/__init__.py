@@ -56,6 +56,5 @@ if TYPE_CHECKING:
         summarise_sources,
     )
     from ._summary_text import nondeterminism_notes, short_text, summary_text
-    from ._trace import Trace
 
 __getattr__ = lazy_page(__name__, __file__)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
@@ -12,10 +13,8 @@ from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
-from ._trace import Trace
-
 if TYPE_CHECKING:
-    from ...crossing import CrossingFrame, CrossingResult
+    from ...crossing import ContactEvent, CrossingFrame, CrossingResult
 
 #: Awareness of the person who came nearest, before the encounter, and the robot's error about it if
 #: there is one; empty if nobody came near.
@@ -75,18 +74,19 @@ def matched_tracks(
     return track[kept], person[kept]
 
 
-def track_awareness(result: CrossingResult, trace: Trace) -> tuple[FloatArray, FloatArray]:
+@lru_cache(maxsize=1)
+def track_awareness(log: CrossingResult) -> tuple[FloatArray, FloatArray]:
     """Return α and its lower bound of each person's track, (N, P) each; NaN without a track.
 
     Tentative tracks count too, because the policy uses them.
     """
-    mean = np.full(trace.awareness.shape, np.nan)
-    lower = np.full(trace.awareness.shape, np.nan)
-    for row, frame in enumerate(result.frames):
+    mean = np.full(log.awareness.shape, np.nan)
+    lower = np.full(log.awareness.shape, np.nan)
+    for row, frame in enumerate(log.frames):
         if frame.tracks:
             positions = np.array([track.position_odom_m for track in frame.tracks])
             for index, person in zip(
-                *matched_tracks(positions, trace.people_odom_m[row]), strict=True
+                *matched_tracks(positions, log.people_odom_m[row]), strict=True
             ):
                 mean[row, person] = frame.tracks[index].awareness
                 lower[row, person] = frame.tracks[index].awareness_lower
@@ -120,7 +120,7 @@ def awareness_class(
 
     Args:
         t_s: (N,) times.
-        looking: (N,) whether the person looks, see :attr:`Trace.looking`.
+        looking: (N,) whether the person looks, see :attr:`CrossingResult.looking`.
         lower: (N,) lower bound of the person's track, NaN without a track.
         row: index of the instant.
     """
@@ -150,17 +150,15 @@ class MeasuredAttention:
     looked_s: FloatArray
 
     @classmethod
-    def of(cls, trace: Trace) -> MeasuredAttention:
+    def of(cls, log: CrossingResult) -> MeasuredAttention:
         """Return the attention of the people of an episode."""
-        matters = trace.could_look & (trace.separation_m < ATTENTION_WITHIN_M)
-        steps_s = np.diff(trace.t_s)
+        matters = log.could_look & (log.separation_m < ATTENTION_WITHIN_M)
+        steps_s = np.diff(log.t_s)
 
         def seconds(condition: NDArray[np.bool_]) -> FloatArray:
             return np.asarray(steps_s @ condition[:-1].astype(np.float64))
 
-        return cls(
-            seconds(matters), seconds(matters & trace.looking), seconds(matters & trace.looks)
-        )
+        return cls(seconds(matters), seconds(matters & log.looking), seconds(matters & log.looks))
 
     @property
     def judged(self) -> NDArray[np.bool_]:
@@ -174,6 +172,22 @@ class MeasuredAttention:
         if not judged.any():
             return None
         return float((self.aware_s[judged] / self.could_look_s[judged]).min())
+
+
+def moving_contacts_of(log: CrossingResult, noticed: str) -> list[ContactEvent]:
+    """Return contacts of a moving robot with people of one of :data:`CONTACT_PEOPLE`."""
+    people = (log.noticed | {"asked": requests_of(log).noticed_when_asked})[noticed]
+    return [
+        each
+        for each in log.moving_contacts
+        if people[max(int(np.searchsorted(log.t_s, each.t_s, "right")) - 1, 0), each.worker]
+    ]
+
+
+def min_margin_of(log: CrossingResult, noticed: str) -> float | None:
+    """Return the smallest margin at a moving robot to people of one of :data:`NOTICED`."""
+    counts = log.noticed[noticed] & log.moves[:, None]
+    return float(log.margins_m[counts].min()) if counts.any() else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,72 +212,72 @@ class Requests:
     answered_people: NDArray[np.bool_]
     noticed_when_asked: NDArray[np.bool_]
 
-    @classmethod
-    def of(cls, result: CrossingResult, trace: Trace) -> Requests:
-        """Return the requests of a crossing."""
-        asked: Counter[int] = Counter()
-        had_answered: set[int] = set()
-        requests = answered = needless = after_answer = 0
-        answered_people, when_asked = np.zeros((2, *trace.looking.shape), dtype=np.bool_)
-        for row, frame in enumerate(result.frames):
-            had_answered |= {answer.track_id for answer in frame.constraints.answers}
-            for alert in frame.constraints.alerts:
-                if alert.kind != "attention":
-                    continue
-                person = _person_of(alert.track_id, frame, trace, row)
-                requests += 1
-                after_answer += alert.track_id in had_answered
-                needless += _was_needless(alert.track_id, person, row, result, trace)
-                if person is not None:
-                    asked[person] += 1
-                    answer = _answer_to(person, row, trace)
-                    if answer is not None:
-                        answered += 1
-                        answered_people[answer:, person] = True
-                        if not trace.has_noticed[answer - 1, person]:
-                            when_asked[answer:, person] = True
-        twice = sum(times > 1 for times in asked.values())
-        return cls(requests, answered, needless, twice, after_answer, answered_people, when_asked)
+
+# Cached, as several measures of an episode need it.
+@lru_cache(maxsize=1)
+def requests_of(log: CrossingResult) -> Requests:
+    """Return the requests of a crossing."""
+    asked: Counter[int] = Counter()
+    had_answered: set[int] = set()
+    requests = answered = needless = after_answer = 0
+    answered_people, when_asked = np.zeros((2, *log.looking.shape), dtype=np.bool_)
+    for row, frame in enumerate(log.frames):
+        had_answered |= {answer.track_id for answer in frame.constraints.answers}
+        for alert in frame.constraints.alerts:
+            if alert.kind != "attention":
+                continue
+            person = _person_of(alert.track_id, frame, log, row)
+            requests += 1
+            after_answer += alert.track_id in had_answered
+            needless += _was_needless(alert.track_id, person, row, log)
+            if person is not None:
+                asked[person] += 1
+                answer = _answer_to(person, row, log)
+                if answer is not None:
+                    answered += 1
+                    answered_people[answer:, person] = True
+                    if not log.has_noticed[answer - 1, person]:
+                        when_asked[answer:, person] = True
+    twice = sum(times > 1 for times in asked.values())
+    return Requests(requests, answered, needless, twice, after_answer, answered_people, when_asked)
 
 
-def _person_of(track_id: int, frame: CrossingFrame, trace: Trace, row: int) -> int | None:
+def _person_of(track_id: int, frame: CrossingFrame, log: CrossingResult, row: int) -> int | None:
     """Return the person nearest to the obstacle of a track, within 1 m; None for nobody."""
     place = next(
         (o.center_odom_m for o in frame.constraints.obstacles if o.track_id == track_id), None
     )
-    if place is None or not trace.people:
+    if place is None or not frame.truth:
         return None
-    distances_m = np.nan_to_num(np.hypot(*(trace.people_odom_m[row] - place).T), nan=np.inf)
+    distances_m = np.nan_to_num(np.hypot(*(log.people_odom_m[row] - place).T), nan=np.inf)
     nearest = int(np.argmin(distances_m))
     return nearest if distances_m[nearest] <= MATCHED_WITHIN_M else None
 
 
-def _answer_to(person: int, row: int, trace: Trace) -> int | None:
+def _answer_to(person: int, row: int, log: CrossingResult) -> int | None:
     """Return the instant, within 2.5 s after a request, in which a person began to look."""
-    since_s = trace.t_s - trace.t_s[row]
-    looks = trace.looks[:, person]
+    since_s = log.t_s - log.t_s[row]
+    looks = log.looks[:, person]
     before = (since_s >= -LOOKED_BEFORE_S - _SAME_S) & (since_s <= 0.0)
     after = (since_s > 0.0) & (since_s <= ANSWERED_WITHIN_S + _SAME_S)
     answered = looks[after].any() and not looks[before].any()
     return int(np.argmax(looks & after)) if answered else None
 
 
-def _was_needless(
-    track_id: int, person: int | None, row: int, result: CrossingResult, trace: Trace
-) -> bool:
+def _was_needless(track_id: int, person: int | None, row: int, log: CrossingResult) -> bool:
     """Return whether somebody no longer set the limit a second later, and had not looked.
 
     The last instant counts in an episode that ends before. A new track of the same person is still
     that person. A track without a person cannot look.
     """
-    after = int(np.searchsorted(trace.t_s, trace.t_s[row] + NEEDED_AFTER_S - _SAME_S))
-    after = min(after, len(trace.t_s) - 1)
-    frame = result.frames[after]
-    if person is not None and trace.looks[row + 1 : after + 1, person].any():
+    after = int(np.searchsorted(log.t_s, log.t_s[row] + NEEDED_AFTER_S - _SAME_S))
+    after = min(after, len(log.t_s) - 1)
+    frame = log.frames[after]
+    if person is not None and log.looks[row + 1 : after + 1, person].any():
         return False
     limiting = _LIMITING.match(frame.constraints.limited_by)
     if limiting is None:
         return True
     limiting_id = int(limiting[1])
-    same_person = person is not None and person == _person_of(limiting_id, frame, trace, after)
+    same_person = person is not None and person == _person_of(limiting_id, frame, log, after)
     return limiting_id != track_id and not same_person

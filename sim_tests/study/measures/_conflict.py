@@ -5,7 +5,7 @@ The robot is the convex hull of its footprint, and a person is a disc.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ._trace import Trace
+if TYPE_CHECKING:
+    from ...crossing import CrossingResult
+
 
 # Poses are compared at this rate; a robot at 1.5 m/s moves 75 mm in between.
 _COMPARED_HZ: Final = 20.0
@@ -108,26 +110,24 @@ class Outline:
 
 
 def min_time_to_collision_s(
-    trace: Trace, outline: Outline, body_radius_m: float = BODY_RADIUS_M
+    log: CrossingResult, body_radius_m: float = BODY_RADIUS_M
 ) -> float | None:
     """Return the smallest time to collision of the episode; None if there was never one.
 
     At each instant it is the time until outline and body disc touch if robot and person keep their
     velocities (Hayward 1972). The robot's turning is not extrapolated.
     """
-    relative = trace.people_odom_m - trace.robot_odom_m[:, None, :]
-    times = outline.time_to_disc(
-        trace.to_base(relative).reshape(-1, 2),
-        (trace.to_base(trace.people_odom_mps) - trace.velocity_base_mps[:, None, :]).reshape(-1, 2),
+    relative = log.people_odom_m - log.robot_odom_m[:, None, :]
+    times = Outline(log.robot.footprint_m).time_to_disc(
+        log.to_base(relative).reshape(-1, 2),
+        (log.to_base(log.people_odom_mps) - log.velocity_base_mps[:, None, :]).reshape(-1, 2),
         body_radius_m,
     )
     smallest = float(np.fmin.reduce(times, initial=np.inf))
     return smallest if np.isfinite(smallest) else None
 
 
-def post_encroachment_s(
-    trace: Trace, outline: Outline, body_radius_m: float = BODY_RADIUS_M
-) -> float | None:
+def post_encroachment_s(log: CrossingResult, body_radius_m: float = BODY_RADIUS_M) -> float | None:
     """Return the smallest post-encroachment time; None if robot and people shared no place.
 
     It is the time between one of robot and person leaving a place and the other entering it (Allen,
@@ -137,13 +137,13 @@ def post_encroachment_s(
     of them, every 0.01 s on straight lines in between. 0 means that the outline and the disc
     overlapped at one instant. The body is slimmer than the disc and may not have been touched.
     """
-    step = 1
-    if len(trace.t_s) > 1:
-        step = max(round(1.0 / (_COMPARED_HZ * float(np.median(np.diff(trace.t_s))))), 1)
+    outline, step = Outline(log.robot.footprint_m), 1
+    if len(log.t_s) > 1:
+        step = max(round(1.0 / (_COMPARED_HZ * float(np.median(np.diff(log.t_s))))), 1)
     smallest = np.inf
-    for person in range(trace.people):
-        paths = _Paths(trace, person, outline, body_radius_m)
-        t_s = trace.t_s[::step]
+    for person in range(log.people_odom_m.shape[1]):
+        paths = _Paths(log, person, outline, body_radius_m)
+        t_s = log.t_s[::step]
         for first in range(0, len(t_s), _ROWS_AT_ONCE):
             robot_s = t_s[first : first + _ROWS_AT_ONCE]
             robot_row, person_row, apart_s = paths.overlaps(robot_s, t_s, smallest)
@@ -160,11 +160,13 @@ def post_encroachment_s(
 class _Paths:
     """The paths of the robot and of one person, interpolated at any instant."""
 
-    def __init__(self, trace: Trace, person: int, outline: Outline, body_radius_m: float) -> None:
-        self._t_s = trace.t_s
-        self._heading_rad = np.unwrap(trace.heading_odom_rad)
-        self._robot_m = trace.robot_odom_m
-        self._person_m = trace.people_odom_m[:, person]
+    def __init__(
+        self, log: CrossingResult, person: int, outline: Outline, body_radius_m: float
+    ) -> None:
+        self._t_s = log.t_s
+        self._heading_rad = np.unwrap(log.heading_odom_rad)
+        self._robot_m = log.robot_odom_m
+        self._person_m = log.people_odom_m[:, person]
         self._outline = outline
         self._radius_m = body_radius_m
 

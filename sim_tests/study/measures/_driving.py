@@ -19,7 +19,7 @@ from ...world.errors import SimError
 if TYPE_CHECKING:
     from nav_adapter import RobotProfile
 
-    from ...crossing import CrossingFrame, CrossingResult
+    from ...crossing import ContactEvent, CrossingFrame, CrossingResult
 
 #: Width of the parabola that smooths the speed; docs/measures.md gives its frequency response.
 SMOOTHED_OVER_S: Final = 0.5
@@ -34,6 +34,11 @@ def path_length_m(positions_m: FloatArray) -> float:
     """Return the length of the polyline through (N, 2) positions."""
     steps = np.diff(positions_m, axis=0)
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+
+
+def fastest_mps(contacts: Iterable[ContactEvent]) -> float | None:
+    """Return the robot's highest speed at some contacts; None for none."""
+    return max((each.robot_speed_mps for each in contacts), default=None)
 
 
 def success_weighted(

@@ -129,13 +129,7 @@ class EpisodeRecord:
         return bool(self.person_contacts > 0 or self.contact_by == "person")
 
 
-def measure(
-    result: CrossingResult,
-    *,
-    time_without_people_s: float | None = None,
-    length_without_people_m: float | None = None,
-    **conditions: Any,
-) -> EpisodeRecord:
+def measure(result: CrossingResult, **conditions: Any) -> EpisodeRecord:
     """Return the row of a crossing: every measure, as docs/measures.md defines them.
 
     Numbers are rounded to the six decimals that files keep, so that a record read from a file is
@@ -143,25 +137,19 @@ def measure(
 
     Args:
         result: the crossing.
-        time_without_people_s: time to goal of the same task without people; None if that run did
-            not reach the goal or was not made.
-        length_without_people_m: driven length of the same task without people.
         conditions: columns that the log does not tell, such as ``scenario_version``, ``attention``
             and ``fault``; or that take the place of those of the result.
 
     Raises:
         SimError: a result without frames, or with frames that do not hold all people.
     """
-    from ._log import Log  # noqa: PLC0415 - needs the simulator
-
-    log = Log(result, time_without_people_s, length_without_people_m)
     values = {
         "scenario": result.scenario,
         "seed": result.seed,
         "policy": result.policy,
         "planner": result.planner,
         "perception": result.perception,
-        **{name: each.of(log) for name, each in COLUMNS.items() if each.of is not None},
+        **{name: each.of(result) for name, each in COLUMNS.items() if each.of is not None},
     }
     return EpisodeRecord(**{**values, **conditions}).rounded()
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 if TYPE_CHECKING:
-    from ._log import Log
+    from ...crossing import CrossingResult
 
-#: People by what they have noticed of the robot, see :attr:`Trace.noticed`: title and meaning.
+#: Titles and meanings of :attr:`CrossingResult.noticed`.
 NOTICED: Final = {
     "never": ("never noticed", "who have never noticed the robot"),
     "past": ("noticed before", "whose last look at the robot was more than 1 s ago"),
@@ -74,7 +74,7 @@ class Column:
     name: str
     kind: Kind
     meaning: str
-    of: Callable[[Log], Any] | None
+    of: Callable[[CrossingResult], Any] | None
     default: Any
     required: bool = False
 

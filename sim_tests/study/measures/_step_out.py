@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -20,9 +21,8 @@ from perception.arrays import FloatArray, finite_number, set_fields
 from ...actors.behaviour import LOOK_WITHIN_S, START_SHARES
 from ...crossing import STANDING_SPEED_MPS
 from ...world.errors import SimError
-from ._awareness import Requests
+from ._awareness import requests_of
 from ._conflict import Outline
-from ._trace import Trace
 
 if TYPE_CHECKING:
     from nav_adapter import RobotProfile
@@ -117,15 +117,17 @@ class StepOutImpacts(NamedTuple):
     worst_mps: float
 
 
-#: The impacts with nobody there, by the people of an episode: those of :attr:`Trace.noticed`, all
-#: of them together, and those who have answered a request.
+#: The impacts with nobody there, by the people of an episode: those of
+#: :attr:`CrossingResult.noticed`, all of them together, and those who have answered a request.
 _NOBODY: Final = dict.fromkeys(
     ("never", "past", "looking", "all", "answered"), StepOutImpacts(*[math.nan] * 3)
 )
 
 
+# Cached, as several measures of an episode need them.
+@lru_cache(maxsize=2)
 def step_out_impacts(
-    result: CrossingResult, model: StepOut = STEP_OUT, *, trace: Trace | None = None
+    log: CrossingResult, model: StepOut = STEP_OUT
 ) -> Mapping[str, StepOutImpacts]:
     """Return the step-out impacts of a crossing with some of its people each.
 
@@ -141,20 +143,19 @@ def step_out_impacts(
     with the person's centre, plus what turning adds at the touching point. A path through a rack, a
     wall or a prop gives none.
     """
-    trace = Trace.of(result) if trace is None else trace
-    if not trace.anybody:
+    if not log.anybody:
         return _NOBODY
-    t_s = trace.t_s
+    t_s = log.t_s
     every = 1
     if len(t_s) > 1:
         every = max(round(_EVERY_S / float(np.median(np.diff(t_s)))), 1)
     instants = np.arange(0, len(t_s), every)
     lasts_s = np.diff(t_s[instants], append=t_s[-1])
-    starts = _Starts(trace, instants, result.robot, model)
-    closing_mps = starts.impacts(result.obstacle_boxes_odom_m)  # (M, 16), 0 without an impact
+    starts = _Starts(log, instants, log.robot, model)
+    closing_mps = starts.impacts(log.obstacle_boxes_odom_m)  # (M, 16), 0 without an impact
     rates_hz = -np.log1p(-np.array(model.start_shares))
     places = starts.row, starts.person
-    by_look = np.searchsorted(np.array(LOOK_WITHIN_S) + 1e-9, trace.since_look_s[places])
+    by_look = np.searchsorted(np.array(LOOK_WITHIN_S) + 1e-9, log.since_look_s[places])
     weights = _CROSSINGS / _DIRECTIONS * rates_hz[by_look] * lasts_s[starts.row // every]
 
     def of(people: NDArray[np.bool_]) -> StepOutImpacts:
@@ -163,9 +164,9 @@ def step_out_impacts(
         return StepOutImpacts(float(impacts), float(fast), float(closing.max(initial=0.0)))
 
     groups = {
-        **trace.noticed,
-        "all": np.ones(trace.looking.shape, dtype=np.bool_),
-        "answered": Requests.of(result, trace).answered_people,
+        **log.noticed,
+        "all": np.ones(log.looking.shape, dtype=np.bool_),
+        "answered": requests_of(log).answered_people,
     }
     return {name: of(people) for name, people in groups.items()}
 
@@ -177,15 +178,15 @@ class _Starts:
     """
 
     def __init__(
-        self, trace: Trace, instants: NDArray[np.intp], robot: RobotProfile, model: StepOut
+        self, log: CrossingResult, instants: NDArray[np.intp], robot: RobotProfile, model: StepOut
     ) -> None:
         self._robot, self._model = robot, model
         self._outline = Outline(robot.footprint_m)
-        places = trace.to_base(trace.people_odom_m - trace.robot_odom_m[:, None])
-        velocities = trace.to_base(trace.people_odom_mps)
+        places = log.to_base(log.people_odom_m - log.robot_odom_m[:, None])
+        velocities = log.to_base(log.people_odom_mps)
         # That of the farthest corner of a robot that turns on the spot.
-        turn_mps = np.abs(trace.yaw_rate_radps) * robot.circumscribed_radius_m
-        speed = np.maximum(trace.travel_mps, turn_mps)[:, None]
+        turn_mps = np.abs(log.yaw_rate_radps) * robot.circumscribed_radius_m
+        speed = np.maximum(log.travel_mps, turn_mps)[:, None]
         brakes_s = speed / robot.max_deceleration_mps2
         until_s = robot.reaction_time_s + model.noticed_after_s + brakes_s
         reach_m = until_s * np.maximum(np.linalg.norm(velocities, axis=2), model.speed_mps)
@@ -194,11 +195,11 @@ class _Starts:
         chosen = np.zeros(len(near), dtype=np.bool_)
         chosen[instants] = True
         self.row, self.person = row, person = np.nonzero(near & chosen[:, None])
-        self._poses_odom = np.column_stack((trace.robot_odom_m, trace.heading_odom_rad))[row]
+        self._poses_odom = np.column_stack((log.robot_odom_m, log.heading_odom_rad))[row]
         self._place_m, self._velocity_mps = places[row, person], velocities[row, person]
         self._robot_mps, self._yaw_rate_radps = (
-            trace.velocity_base_mps[row],
-            trace.yaw_rate_radps[row],
+            log.velocity_base_mps[row],
+            log.yaw_rate_radps[row],
         )
         self._speed_mps = speed[row, 0]
 

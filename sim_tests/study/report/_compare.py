@@ -15,10 +15,10 @@ from awarenav.files import json_text
 from nav_adapter import AwarenessPolicy
 
 from ...conditions import ORACLE, REFERENCE_PLANNER
-from ...scenario import ScenarioTemplate
+from ...scenario import Scenario
 from ...world.errors import SimError
 from ..measures import BASELINE, EpisodeRecord
-from ..runs import Job, plan_jobs, policy_of, run_jobs, template_of
+from ..runs import Job, plan_jobs, policy_of, run_jobs, scenario_of
 from ._results import WIDE_KEY, Results, Run
 
 #: Radii of the probe, as a multiple of the policy's.
@@ -30,7 +30,7 @@ _LARGEST_RADIUS_M: Final = 10.0
 
 def compare_planners(
     planners: Iterable[str | type | Any],
-    scenarios: Sequence[str | ScenarioTemplate],
+    scenarios: Sequence[str | Scenario],
     out_dir: Path | str,
     *,
     policies: Sequence[str | tuple[str, AwarenessPolicy]] = ("balanced",),
@@ -84,7 +84,7 @@ def compare_planners(
 
 def plan_comparison(
     planners: Sequence[str],
-    scenarios: Sequence[str | ScenarioTemplate],
+    scenarios: Sequence[str | Scenario],
     policies: Sequence[str | tuple[str, AwarenessPolicy]],
     seeds: Sequence[int],
     *,
@@ -106,9 +106,9 @@ def plan_comparison(
         scenarios, [BASELINE, *(p for p in policies if p != BASELINE)], seeds, **conditions
     )
     for text in dict.fromkeys(job.scenario_text for job in main):
-        if template_of(text).median().robot.straight_on_speed_mps is not None:
+        if scenario_of(text).robot.straight_on_speed_mps is not None:
             raise SimError(
-                f"scenario {template_of(text).name!r} drives straight on without a planner, so it "
+                f"scenario {scenario_of(text).name!r} drives straight on without a planner, so it "
                 "cannot compare planners"
             )
     texts = {job.policy: job.policy_text for job in main}

@@ -12,8 +12,9 @@ from tqdm import tqdm
 from awarenav.files import json_text
 
 from ..measures import NOTHING
+from ..runs import Attempt
 from ._page import Cell, Row, Section, Still, Table, number_cell
-from ._results import Arm, Episode, Results, Run, outcome_of, worst_first
+from ._results import Arm, Results, Run, outcome_of, worst_first
 
 #: Most episodes with pictures; of each scenario and arm only the worst.
 MOST_STILLS: Final = 4
@@ -35,7 +36,7 @@ def stills_section(run: Run, results: Results, *, pictures: bool, progress: bool
         if each.record.moving_touched
         or (arm.name in judged and each.record.min_margin_m is not None)
     ]
-    found: dict[tuple[str, str], tuple[Arm, Episode]] = {}
+    found: dict[tuple[str, str], tuple[Arm, Attempt]] = {}
     for arm, each in sorted(points, key=lambda point: worst_first(point[1])):
         found.setdefault((arm.name, each.record.scenario), (arm, each))
     worst = list(found.values())[:MOST_STILLS]
@@ -57,7 +58,7 @@ def stills_section(run: Run, results: Results, *, pictures: bool, progress: bool
     return Section("worst", "Worst", lead, stills=stills)
 
 
-def _still(run: Run, arm: Arm, episode: Episode, *, pictures: bool) -> Still:
+def _still(run: Run, arm: Arm, episode: Attempt, *, pictures: bool) -> Still:
     record = episode.record
     parts = [
         f"seed {record.seed}",
@@ -74,7 +75,7 @@ def _still(run: Run, arm: Arm, episode: Episode, *, pictures: bool) -> Still:
     return Still(f"{arm.name}, {record.scenario}", text, run.replay(episode), shown)
 
 
-def _pictures(run: Run, episode: Episode) -> tuple[tuple[tuple[str, str], ...], str]:
+def _pictures(run: Run, episode: Attempt) -> tuple[tuple[tuple[str, str], ...], str]:
     """Return the pictures of an episode, or the reason why there are none."""
     if episode.number is None:
         return (), "No picture: its job is not known."

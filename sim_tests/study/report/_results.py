@@ -21,7 +21,6 @@ from ..measures import (
     OVERSHOOT_MPS,
     THIN,
     Comparison,
-    Conduct,
     EpisodeRecord,
     Interval,
     Summary,
@@ -35,7 +34,7 @@ from ..measures import (
     proportion_interval,
     summarise,
 )
-from ..runs import Job, RunFiles, read_attempts, read_jobs, read_rows, read_run
+from ..runs import Attempt, Job, RunFiles, read_attempts, read_jobs, read_rows, read_run
 
 #: Key in ``run.json`` of the policy with wider radii, by which planners are probed.
 WIDE_KEY: Final = "wide_policy"
@@ -43,21 +42,6 @@ WIDE_KEY: Final = "wide_policy"
 CEILING: Final = "oracle"
 # Arms are shown in this order; candidates lie between.
 _ORDER: Final = {BASELINE: 0, CEILING: 2}
-
-
-@dataclass(frozen=True, slots=True)
-class Episode:
-    """One episode of a run.
-
-    Attributes:
-        number: number of its job, from 0, as ``awarenav replay`` takes it; None without a job.
-        record: its row in ``episodes.csv``.
-        conduct: conduct of its planner; None where it is not known.
-    """
-
-    number: int | None
-    record: EpisodeRecord
-    conduct: Conduct | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +57,7 @@ class Run:
     """
 
     path: Path
-    episodes: tuple[Episode, ...]
+    episodes: tuple[Attempt, ...]
     jobs: tuple[Job, ...]
     about: dict[str, Any]
     missing: tuple[str, ...]
@@ -97,13 +81,14 @@ class Run:
                 f"{files.run.name} cannot be read: the command and the versions are not known."
             )
         if attempts := read_attempts(path) if jobs else {}:
-            episodes = [Episode(n, each.record, each.conduct) for n, each in attempts.items()]
+            episodes = list(attempts.values())
         else:
             records = read_rows(path)
             # A whole table is in the order of its jobs.
             is_whole = len(records) == len(jobs) and all(map(_fits, jobs, records))
             numbers = range(len(jobs)) if is_whole else [None] * len(records)
-            episodes = [Episode(*each) for each in zip(numbers, records, strict=True)]
+            pairs = zip(records, numbers, strict=True)
+            episodes = [Attempt(record, number=number) for record, number in pairs]
         if waiting := max(len(jobs) - len(episodes), 0):
             missing.append(
                 f"{waiting} of {counted(len(jobs), 'episode')} did not run yet; the same command "
@@ -116,13 +101,13 @@ class Run:
         """Name of the policy of the probe of wider radii; empty without a probe."""
         return str(self.about.get(WIDE_KEY, ""))
 
-    def replay(self, episode: Episode) -> str:
+    def replay(self, episode: Attempt) -> str:
         """Return the command that replays an episode; empty where its job is not known."""
         if episode.number is None:
             return ""
         return f"awarenav replay {shlex.quote(str(self.path))} {episode.number}"
 
-    def page(self, episode: Episode, folder: Path) -> str:
+    def page(self, episode: Attempt, folder: Path) -> str:
         """Return the address of an episode's replay page, from a folder; empty without a page."""
         if episode.number is None:
             return ""
@@ -142,8 +127,8 @@ class Arm:
     name: str
     variant: Variant
     row: SummaryRow
-    episodes: tuple[Episode, ...]
-    others: tuple[Episode, ...]
+    episodes: tuple[Attempt, ...]
+    others: tuple[Attempt, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +146,7 @@ class Results:
     fault: str
     arms: tuple[Arm, ...]
     summary: Summary
-    probe: tuple[Episode, ...]
+    probe: tuple[Attempt, ...]
 
     @classmethod
     def of(cls, run: Run) -> Results:
@@ -249,12 +234,12 @@ class Results:
         )
 
 
-def moving_contacts(episodes: Sequence[Episode]) -> Interval:
+def moving_contacts(episodes: Sequence[Attempt]) -> Interval:
     """Return the share of episodes in which a person and the moving robot touched."""
     return proportion_interval(sum(each.record.moving_touched for each in episodes), len(episodes))
 
 
-def _contacts(ran: Sequence[Episode]) -> str:
+def _contacts(ran: Sequence[Attempt]) -> str:
     share = moving_contacts(ran)
     touched, total = share.count, counted(share.n, "episode")
     if not touched:
@@ -269,7 +254,7 @@ def _contacts(ran: Sequence[Episode]) -> str:
     )
 
 
-def _margins(ran: Sequence[Episode]) -> str:
+def _margins(ran: Sequence[Attempt]) -> str:
     """Return the sentence on the smallest separation margin of all episodes."""
     margins_m = [e.record.min_margin_m for e in ran if e.record.min_margin_m is not None]
     if not margins_m:
@@ -281,7 +266,7 @@ def _margins(ran: Sequence[Episode]) -> str:
     return f"The worst margin is {number_text(min(margins_m))} m, {where}."
 
 
-def _obeys(ran: Sequence[Episode]) -> str:
+def _obeys(ran: Sequence[Attempt]) -> str:
     """Return the sentence on the speed limit; empty where the conduct is not known."""
     conducts = [each.conduct for each in ran if each.conduct is not None]
     excesses = {
@@ -300,7 +285,7 @@ def _obeys(ran: Sequence[Episode]) -> str:
     return f"It exceeds {' and '.join(over)}." if over else "It obeys the speed limit."
 
 
-def _goals(episodes: Sequence[Episode]) -> str:
+def _goals(episodes: Sequence[Attempt]) -> str:
     missed = sum(each.record.time_to_goal_s is None for each in episodes)
     if not missed:
         return "It misses no goal."
@@ -338,7 +323,7 @@ def _violates(against: Comparison, who: str) -> str:
     )
 
 
-def worst_first(episode: Episode) -> tuple[int, float, tuple[str, int, int]]:
+def worst_first(episode: Attempt) -> tuple[int, float, tuple[str, int, int]]:
     """Return a sort key: contacts with the moving robot, then errors, then the smallest margins."""
     record = episode.record
     severity = 0 if record.moving_touched else 1 if record.error else 2
@@ -346,7 +331,7 @@ def worst_first(episode: Episode) -> tuple[int, float, tuple[str, int, int]]:
     return severity, margin, (record.scenario, record.scenario_version, record.seed)
 
 
-def outcome_of(episode: Episode) -> str:
+def outcome_of(episode: Attempt) -> str:
     """Return a remark on the outcome of an episode; empty for a success."""
     record = episode.record
     if record.error:

@@ -27,11 +27,11 @@ from ..measures import (
     paired_difference,
     proportion_interval,
 )
-from ..runs import Job, answering_note
+from ..runs import Attempt, Job, answering_note
 from ._charts import episode_chart, risk_chart
 from ._episodes import episodes_section, failures_section, reproduction_section, stills_section
 from ._page import Cell, Row, Section, Table, interval_cell, number_cell, share_cell, write_page
-from ._results import Arm, Episode, Results, Run, moving_contacts
+from ._results import Arm, Results, Run, moving_contacts
 
 # Awareness classes, and their meaning.
 _AWARENESS: Final = {
@@ -380,7 +380,7 @@ def planners_section(results: Results, run: Run) -> Section | None:
     return Section("planners", "Planners", tables=tables)
 
 
-def _reference_of(arm: Arm, results: Results) -> Sequence[Episode]:
+def _reference_of(arm: Arm, results: Results) -> Sequence[Attempt]:
     """Return the episodes of the reference planner with the policy and perception of an arm."""
     same = (arm.variant.policy, REFERENCE_IN_TABLES, arm.variant.perception)
     for each in results.arms:
@@ -389,7 +389,7 @@ def _reference_of(arm: Arm, results: Results) -> Sequence[Episode]:
     return ()
 
 
-def _conduct_row(arm: Arm, reference: Sequence[Episode]) -> Row:
+def _conduct_row(arm: Arm, reference: Sequence[Attempt]) -> Row:
     conducts = [each.conduct for each in arm.episodes if each.conduct is not None]
     peers = {_task(each): each.conduct for each in reference if each.conduct is not None}
     ratios = [
@@ -412,7 +412,7 @@ def _conduct_row(arm: Arm, reference: Sequence[Episode]) -> Row:
     ]
 
 
-def _task(episode: Episode) -> tuple[str, int]:
+def _task(episode: Attempt) -> tuple[str, int]:
     return episode.record.scenario, episode.record.seed
 
 

@@ -14,16 +14,17 @@ if TYPE_CHECKING:
         experiment_jobs,
         fault_of,
         job_of,
-        named_templates,
+        named_scenarios,
         plan_jobs,
         policy_of,
         policy_text,
         sample_jobs,
-        template_of,
+        scenario_of,
     )
     from ._replay import box_scale_of, find_episode, recorder_of, replay_command
     from ._run import held, run_jobs, terminated_as_interrupted
     from ._run_files import (
+        Attempt,
         Job,
         RunFiles,
         answering_note,

@@ -6,19 +6,17 @@ import faulthandler
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from traceback import format_exc
 from typing import Final
-
-import numpy as np
 
 from ...crossing import CrossingResult, Observer, Setup, drive
 from ...crossing.planner import is_outside
 from ...scenario import Scenario
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, measure, path_length_m
-from ._plan import fault_of, policy_of, template_of
+from ._plan import fault_of, policy_of, scenario_of
 from ._run_files import Attempt, Job
 
 # Seed of the planner in the task without people, the same for every episode of the task.
@@ -29,22 +27,6 @@ _FREE_POLICY: Final = "balanced"
 _GRACE_S: Final = 5.0
 
 
-@dataclass(frozen=True, slots=True)
-class FreeRun:
-    """A task driven without people and without a fault.
-
-    Attributes:
-        time_s: time to goal; None if the goal was not reached.
-        length_m: length of the driven path; None likewise.
-        repeats: False if the user's planner gave other commands the second time, with the same
-            seed. The reference planner is deterministic and drives only once.
-    """
-
-    time_s: float | None
-    length_m: float | None
-    repeats: bool
-
-
 def run_episode(job: Job) -> EpisodeRecord:
     """Run and measure one episode; an exception becomes ``error`` of the record.
 
@@ -53,12 +35,14 @@ def run_episode(job: Job) -> EpisodeRecord:
     return attempt(job).record
 
 
-def attempt(job: Job, free: FreeRun | None = None, *, limit_s: float | None = None) -> Attempt:
+def attempt(
+    job: Job, free: EpisodeRecord | None = None, *, limit_s: float | None = None
+) -> Attempt:
     """Run and measure one episode; only an interruption is raised.
 
     Args:
         job: the episode.
-        free: its task without people; None to drive that too.
+        free: the row of its task without people; None drives that too.
         limit_s: wall-clock limit, in a process that runs nothing else; None for no limit.
     """
     try:
@@ -98,23 +82,25 @@ def _ended_after(limit_s: float | None) -> Iterator[None]:
 
 
 def observed_episode(
-    job: Job, observer: Observer | None = None, *, free: FreeRun | None = None
+    job: Job, observer: Observer | None = None, *, free: EpisodeRecord | None = None
 ) -> tuple[CrossingResult, EpisodeRecord]:
     """Run and measure one episode, watched by ``observer``; exceptions are raised.
 
-    ``free`` is its task without people; None drives that too.
+    ``free`` is the row of its task without people; None drives that too.
     """
-    template = template_of(job.scenario_text)
+    scenario = scenario_of(job.scenario_text)
     # Before the episode: what a planner imports only while it drives is then there.
     free = free_run_of(job) if free is None else free
-    result = drive(setup_of(job), observer)
+    result = replace(
+        drive(setup_of(job), observer),
+        time_without_people_s=free.time_to_goal_s,
+        length_without_people_m=free.path_length_m,
+    )
     record = measure(
         result,
-        time_without_people_s=free.time_s,
-        length_without_people_m=free.length_m,
-        scenario_version=template.version,
-        attention=template.attention,
-        nondeterministic=not free.repeats,
+        scenario_version=scenario.version,
+        attention=scenario.attention,
+        nondeterministic=free.nondeterministic,
         **asdict(job.conditions),
     )
     return result, record
@@ -124,7 +110,7 @@ def setup_of(job: Job) -> Setup:
     """Return the episode of a job; raise SimError for a job that cannot be read."""
     return Setup(
         conditions=job.conditions,
-        scenario=template_of(job.scenario_text).for_seed(job.seed),
+        scenario=scenario_of(job.scenario_text).draw(job.seed),
         policy=policy_of(job.policy_text),
         planner=job.planner_text,
         fault=fault_of(job.fault_text),
@@ -134,10 +120,10 @@ def setup_of(job: Job) -> Setup:
 def task_of(job: Job) -> tuple[str, int, str]:
     """Return the key of a job's task without people: jobs with the same key share it."""
     try:
-        parameters = template_of(job.scenario_text).parameters()
+        distributions = scenario_of(job.scenario_text).distributions
     except SimError:  # each of its episodes says it
-        parameters = {}
-    varies = any(path.startswith("robot.") for path in parameters)
+        distributions = {}
+    varies = any(path.startswith("robot.") for path in distributions)
     return job.scenario_text, job.seed if varies else 0, job.planner_text
 
 
@@ -149,20 +135,24 @@ def people_in(job: Job) -> int:
 @lru_cache(maxsize=256)
 def _people_in(scenario_text: str) -> int:
     try:
-        return len(template_of(scenario_text).median().people)
+        return len(scenario_of(scenario_text).people)
     except SimError:  # its episodes say it
         return 0
 
 
-def free_run_of(job: Job) -> FreeRun:
-    """Return the figures of a job's task without people; unknown for a robot without a planner."""
-    scenario = template_of(job.scenario_text).for_seed(job.seed)
+def free_run_of(job: Job) -> EpisodeRecord:
+    """Return the row of a job's task without people and without a fault.
+
+    It has the time to goal and the path length of a robot that arrived, and ``nondeterministic``;
+    nothing of a robot without a planner.
+    """
+    scenario = scenario_of(job.scenario_text).draw(job.seed)
     if not job.planner_text and scenario.robot.straight_on_speed_mps is not None:
-        return FreeRun(None, None, repeats=True)
+        return EpisodeRecord(**asdict(job.conditions))
     return _free_run(scenario.without_people().model_dump_json(), job.planner_text)
 
 
-def free_run_or_none(job: Job, *, limit_s: float | None = None) -> FreeRun | None:
+def free_run_or_none(job: Job, *, limit_s: float | None = None) -> EpisodeRecord | None:
     """Return :func:`free_run_of`; None for one that fails, as its episodes will.
 
     ``limit_s`` is that of :func:`attempt`.
@@ -180,10 +170,10 @@ def failed(job: Job, error: str, traceback: str = "") -> Attempt:
     line = " ".join(error.replace("\0", "").splitlines())[:500]
     record = EpisodeRecord(**asdict(job.conditions), error=line)
     try:
-        template = template_of(job.scenario_text)
+        scenario = scenario_of(job.scenario_text)
     except SimError:  # the scenario cannot be read
         return Attempt(record, traceback)
-    about = {"scenario_version": template.version, "attention": template.attention}
+    about = {"scenario_version": scenario.version, "attention": scenario.attention}
     return Attempt(replace(record, **about), traceback)
 
 
@@ -194,11 +184,11 @@ def died(job: Job, reason: str) -> Attempt:
 
 # Cached, because one process runs many episodes of few tasks.
 @lru_cache(maxsize=4096)
-def _free_run(task: str, planner: str) -> FreeRun:
-    """Return the figures of a task without people: JSON of a :class:`Scenario`.
+def _free_run(task: str, planner: str) -> EpisodeRecord:
+    """Return the row of a task without people: JSON of a :class:`Scenario`.
 
     A planner of the user's drives it twice, and both must give the same commands in every cycle. A
-    stack outside never does, and drives it once.
+    stack outside never does, and drives it once. The reference planner is deterministic.
     """
     scenario = Scenario.model_validate_json(task)
     setup = Setup.of(scenario, policy=_FREE_POLICY, planner=planner, seed=_FREE_SEED)
@@ -206,10 +196,13 @@ def _free_run(task: str, planner: str) -> FreeRun:
     repeats = not planner or (
         not is_outside(planner) and _commands(first) == _commands(drive(setup))
     )
-    if first.time_to_goal_s is None:
-        return FreeRun(None, None, repeats)
-    path_m = np.array([frame.robot_state.position_odom_m for frame in first.frames])
-    return FreeRun(first.time_to_goal_s, path_length_m(path_m), repeats)
+    arrived_s = first.time_to_goal_s
+    return EpisodeRecord(
+        **asdict(setup.conditions),
+        time_to_goal_s=arrived_s,
+        path_length_m=None if arrived_s is None else path_length_m(first.robot_odom_m),
+        nondeterministic=not repeats,
+    )
 
 
 def _commands(result: CrossingResult) -> list[tuple[float, float, float]]:

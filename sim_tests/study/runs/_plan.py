@@ -35,7 +35,7 @@ from ...conditions import (
 from ...crossing import named_policy
 from ...crossing.faults import Fault, shipped_faults
 from ...crossing.planner import planner_label, refuse_unusable_planner
-from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
+from ...scenario import SCENARIO_SETS, Scenario, shipped_scenarios
 from ...world.errors import SimError
 from ._run_files import Job
 
@@ -47,7 +47,7 @@ _STREAM: Final = 83
 
 
 def plan_jobs(
-    scenarios: Sequence[str | ScenarioTemplate],
+    scenarios: Sequence[str | Scenario],
     policies: Sequence[str | tuple[str, AwarenessPolicy]],
     seeds: Iterable[int],
     *,
@@ -62,7 +62,7 @@ def plan_jobs(
     They are nested in that order.
 
     Args:
-        scenarios: templates, shipped names, YAML files, or sets (:data:`SCENARIO_SETS`)
+        scenarios: scenarios, shipped names, YAML files, or sets (:data:`SCENARIO_SETS`)
             without the scenarios that need no planner.
         policies: names of presets, YAML files, pairs of a name for the tables and a policy, or
             ``"oracle"``. The oracle is ``balanced`` with perception that knows the truth: the
@@ -85,20 +85,20 @@ def plan_jobs(
     """
     perceptions = [Perception.of(perception, each).name for each in sensors]
     refuse_unused_networks(axes, perception)
-    templates = _expanded(scenarios, axes)
+    expanded = _expanded(scenarios, axes)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
     checked_seeds = [_checked_seed(seed) for seed in seeds]
     names = {name: table_name(value) for name, value in axes.items()}
     for planner in planners:
-        if templates:
-            refuse_unusable_planner(planner, templates[0].median())
+        if expanded:
+            refuse_unusable_planner(planner, expanded[0])
     jobs = tuple(
         Job(
-            template.name,
+            scenario.name,
             seed,
             policy_name,
-            planner_label(planner, template.median()),
+            planner_label(planner, scenario),
             policy_perception,
             fault=fault_name,
             **names,
@@ -107,7 +107,7 @@ def plan_jobs(
             planner_text=planner,
             fault_text=fault,
         )
-        for template, text in ((each, each.to_text()) for each in templates)
+        for scenario, text in ((each, each.to_text()) for each in expanded)
         for seed in checked_seeds
         for fault_name, fault in fault_texts
         for planner in planners
@@ -154,12 +154,12 @@ def job_of(scenario_text: str, policy: tuple[str, str], planner: str, **axes: An
     """Return the job of a scenario whose conditions are already in it.
 
     Args:
-        scenario_text: YAML of a :class:`ScenarioTemplate`.
+        scenario_text: YAML of a :class:`Scenario`.
         policy: its name in tables, and its YAML.
         planner: ``"module:Class"``, or empty for the reference planner.
         axes: ``seed`` and ``perception``, as fields of a job.
     """
-    scenario = template_of(scenario_text).median()
+    scenario = scenario_of(scenario_text)
     return Job(
         scenario=scenario.name,
         policy=policy[0],
@@ -171,7 +171,7 @@ def job_of(scenario_text: str, policy: tuple[str, str], planner: str, **axes: An
     )
 
 
-def named_templates(names: Sequence[str], **axes: str) -> tuple[ScenarioTemplate, ...]:
+def named_scenarios(names: Sequence[str], **axes: str) -> tuple[Scenario, ...]:
     """Return the scenarios of names and YAML files, each once.
 
     Args:
@@ -182,17 +182,17 @@ def named_templates(names: Sequence[str], **axes: str) -> tuple[ScenarioTemplate
     Raises:
         SimError: an unknown name, an unusable file, camera or robot, or two scenarios of one name.
     """
-    found: dict[str, ScenarioTemplate] = {}
-    for template in _expanded(names, axes):
-        if found.setdefault(template.name, template) != template:
-            raise SimError(f"two scenarios are called {template.name!r}; give them other names")
+    found: dict[str, Scenario] = {}
+    for scenario in _expanded(names, axes):
+        if found.setdefault(scenario.name, scenario) != scenario:
+            raise SimError(f"two scenarios are called {scenario.name!r}; give them other names")
     return tuple(found.values())
 
 
 @lru_cache(maxsize=256)
-def template_of(text: str) -> ScenarioTemplate:
+def scenario_of(text: str) -> Scenario:
     """Return the scenario of a job; raise SimError for YAML that holds none."""
-    return ScenarioTemplate.from_text(text)
+    return Scenario.from_text(text)
 
 
 @lru_cache(maxsize=256)
@@ -226,23 +226,21 @@ def policy_text(policy: AwarenessPolicy) -> str:
         ) from cause
 
 
-def _expanded(
-    scenarios: Iterable[str | ScenarioTemplate], axes: Mapping[str, str]
-) -> list[ScenarioTemplate]:
-    """Return the templates of names and files, as camera, robot and population change them."""
-    templates: list[ScenarioTemplate] = []
+def _expanded(scenarios: Iterable[str | Scenario], axes: Mapping[str, str]) -> list[Scenario]:
+    """Return the scenarios of names and files, as camera, robot and population change them."""
+    found: list[Scenario] = []
     for each in scenarios:
-        if isinstance(each, ScenarioTemplate):
-            templates.append(each)
+        if isinstance(each, Scenario):
+            found.append(each)
         elif each in SCENARIO_SETS:
-            templates += [
-                template
-                for template in shipped_templates(each)
-                if template.median().robot.straight_on_speed_mps is None
+            found += [
+                scenario
+                for scenario in map(Scenario.shipped, shipped_scenarios(each))
+                if scenario.robot.straight_on_speed_mps is None
             ]
         else:
-            templates.append(ScenarioTemplate.named(each))
-    return [changed_scenario(each, axes) for each in templates]
+            found.append(Scenario.named(each))
+    return [changed_scenario(each, axes) for each in found]
 
 
 def _named_policy(

@@ -24,7 +24,7 @@ from ...viewing import CameraPictures, CrossingRecorder, outcome_text, show_page
 from ...world.errors import SimError
 from ..measures import RECORD_COLUMNS, EpisodeRecord, nondeterminism_notes, record_row
 from ._episode import observed_episode
-from ._plan import template_of
+from ._plan import scenario_of
 from ._run_files import Job, RunFiles, read_jobs, read_rows
 
 Image = NDArray[np.uint8]
@@ -139,7 +139,7 @@ def _drawn(
 
     Its progress counts to the length that it had before, or to its time limit.
     """
-    scenario = template_of(job.scenario_text).for_seed(job.seed)
+    scenario = scenario_of(job.scenario_text).draw(job.seed)
     total = round((length_s or scenario.duration_s) * scenario.control_hz)
     with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
         if view:
@@ -181,7 +181,7 @@ def recorder_of(
 
 def box_scale_of(job: Job) -> float:
     """Return the size of the images of a job's boxes, over that of its scenario's camera."""
-    spec = template_of(job.scenario_text).for_seed(job.seed).camera
+    spec = scenario_of(job.scenario_text).draw(job.seed).camera
     sensors = map(sensor_class, Perception.named(job.perception))
     return next((each.scale(spec) for each in sensors if issubclass(each, CameraSensor)), 1.0)
 

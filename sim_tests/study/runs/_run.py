@@ -27,7 +27,7 @@ from ...crossing.planner import is_outside
 from ...world.bullet import require_pybullet
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, write_records
-from ._episode import FreeRun, attempt, died, failed, free_run_or_none, people_in, task_of
+from ._episode import attempt, died, failed, free_run_or_none, people_in, task_of
 from ._parallel import Workers
 from ._run_files import (
     JOB_FIELDS,
@@ -42,7 +42,7 @@ from ._run_files import (
 )
 
 # An episode with its task without people, where another episode has that in common.
-_Item = tuple[Job, FreeRun | None]
+_Item = tuple[Job, EpisodeRecord | None]
 
 _OTHER_WAY: Final = (
     "resume with the arguments that began it, which run.json holds, or run into another folder"
@@ -155,7 +155,7 @@ def _with_free_runs(jobs: Sequence[Job], some: Workers, limit_s: float | None) -
     tasks = [task_of(job) for job in jobs]
     counts = Counter(tasks)
     shared = {task: job for job, task in zip(jobs, tasks, strict=True) if counts[task] > 1}
-    found: dict[Any, FreeRun | None] = {}
+    found: dict[Any, EpisodeRecord | None] = {}
     names = list(shared)
     drive_free = partial(free_run_or_none, limit_s=limit_s)
     for place, free in some.results(drive_free, shared.values(), on_death=_no_free_run):
@@ -163,7 +163,7 @@ def _with_free_runs(jobs: Sequence[Job], some: Workers, limit_s: float | None) -
     return [(job, found.get(task)) for job, task in zip(jobs, tasks, strict=True)]
 
 
-def _no_free_run(job: Job, reason: str) -> FreeRun | None:
+def _no_free_run(job: Job, reason: str) -> EpisodeRecord | None:
     return None
 
 
@@ -261,7 +261,9 @@ class RunFolder(AbstractContextManager["RunFolder"]):
 
     def add(self, number: int, attempt: Attempt) -> None:
         """Write the file of an episode."""
-        text = json.dumps(asdict(attempt), ensure_ascii=False) + "\n"
+        content = asdict(attempt)
+        del content["number"]  # the name of the file
+        text = json.dumps(content, ensure_ascii=False) + "\n"
         write_text(self._files.episode(number), text, SimError)
         self.done[number] = attempt
 

@@ -30,7 +30,7 @@ class Job(Conditions):
     even if the files change in the meantime. Each line of ``jobs.jsonl`` has these fields.
 
     Attributes:
-        scenario_text: YAML of a :class:`ScenarioTemplate`, with the camera, the robot and the
+        scenario_text: YAML of a :class:`Scenario`, with the camera, the robot and the
             population.
         policy_text: YAML of an :class:`AwarenessPolicy`.
         planner_text: ``"module:Class"``, empty for the reference planner.
@@ -49,11 +49,19 @@ JOB_FIELDS: Final = tuple(field.name for field in fields(Job))
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """The outcome of one episode."""
+    """The outcome of one episode.
+
+    Attributes:
+        record: its row in ``episodes.csv``.
+        traceback: of the error that ended it; empty without one.
+        conduct: conduct of its planner; None where it is not known.
+        number: number of its job, from 0, as ``awarenav replay`` takes it; None without a job.
+    """
 
     record: EpisodeRecord
     traceback: str = ""
     conduct: Conduct | None = None
+    number: int | None = None
 
 
 def versions() -> dict[str, str]:
@@ -176,6 +184,7 @@ def read_attempts(folder: Path) -> dict[int, Attempt]:
                 EpisodeRecord(**content["record"]),
                 content["traceback"],
                 None if conduct is None else Conduct(**conduct),
+                number,
             )
         except (ValueError, TypeError, KeyError) as cause:
             raise not_of_this_run(path, str(cause)) from cause

@@ -12,16 +12,16 @@ from tqdm import tqdm
 from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
-from ...scenario import Scenario, ScenarioTemplate
+from ...scenario import Scenario
 from ...scenario.catalogue import (
     CHECKED_DRAWS,
     CONFLICT_M,
     approach_statistics,
+    drawn_problems,
     names_of_sets,
-    template_problems,
 )
 from ...world.errors import MissingSimulatorError, SimError
-from ..measures import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNAWARE_UP_TO, MeasuredAttention, Trace
+from ..measures import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNAWARE_UP_TO, MeasuredAttention
 
 if TYPE_CHECKING:
     from ...crossing import CrossingResult
@@ -44,8 +44,8 @@ def validate_command(files: Sequence[str], episodes: int) -> int:
 
 def _validate(file: str, episodes: int) -> int:
     try:
-        template = ScenarioTemplate.named(file)
-        found = template_problems(template)
+        scenario = Scenario.named(file)
+        found = drawn_problems(scenario)
     except SimError as error:
         print(f"{file}: cannot be run\n  {error}")
         return _CANNOT_RUN
@@ -53,20 +53,20 @@ def _validate(file: str, episodes: int) -> int:
         print(f"{file}: cannot be run")
         print("\n".join(f"  {problem}" for problem in found))
         return _CANNOT_RUN
-    approach = _approach_remark(template)
-    wrong, remarks = ((), ()) if approach is None else _attention_findings(template, episodes)
-    varying = counted(len(template.parameters()), "number varies", "numbers vary")
+    approach = _approach_remark(scenario)
+    wrong, remarks = ((), ()) if approach is None else _attention_findings(scenario, episodes)
+    varying = counted(len(scenario.distributions), "number varies", "numbers vary")
     verdict = "can be run, but its attention is wrong" if wrong else "can be run"
-    print(f"{file}: {template.id}, {varying}: {verdict}")
+    print(f"{file}: {scenario.id}, {varying}: {verdict}")
     people = "it has no people, or only those of replay_csv" if approach is None else approach
     for line in (*wrong, people, *remarks):
         print(f"  {line}")
     return _WRONG_LABEL if wrong else 0
 
 
-def _approach_remark(template: ScenarioTemplate) -> str | None:
+def _approach_remark(scenario: Scenario) -> str | None:
     """Return how often robot and people would meet; None without planned people."""
-    statistics = approach_statistics(template, CHECKED_DRAWS)
+    statistics = approach_statistics(scenario, CHECKED_DRAWS)
     if statistics is None:
         return None
     remark = (
@@ -79,21 +79,21 @@ def _approach_remark(template: ScenarioTemplate) -> str | None:
 
 
 def _attention_findings(
-    template: ScenarioTemplate, episodes: int
+    scenario: Scenario, episodes: int
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return what contradicts the scenario's ``attention``, and what was measured."""
     if not episodes:
         return (), ()
     seeds = tqdm(
         range(episodes),
-        desc=template.name,
+        desc=scenario.name,
         unit="crossing",
         disable=None,
         leave=False,
         file=sys.stderr,
     )
     try:
-        check = check_attention(template, seeds)
+        check = check_attention(scenario, seeds)
     except MissingSimulatorError as error:
         return (), (f"what people look at was not measured: {error}",)
     return check.contradictions, check.remarks
@@ -125,11 +125,11 @@ class AttentionCheck:
     people: tuple[PersonAttention, ...]
 
     @classmethod
-    def of(cls, template: ScenarioTemplate, results: Iterable[CrossingResult]) -> AttentionCheck:
+    def of(cls, scenario: Scenario, results: Iterable[CrossingResult]) -> AttentionCheck:
         """Return the check of a scenario by crossings of it."""
-        measured = [MeasuredAttention.of(Trace.of(result)) for result in results]
-        names = _names(template.median(), measured)
-        return cls(template.attention, len(measured), _people(names, measured))
+        measured = [MeasuredAttention.of(result) for result in results]
+        names = _names(scenario, measured)
+        return cls(scenario.attention, len(measured), _people(names, measured))
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -178,7 +178,7 @@ class AttentionCheck:
         return tuple(found)
 
 
-def check_attention(template: ScenarioTemplate, seeds: Iterable[int]) -> AttentionCheck:
+def check_attention(scenario: Scenario, seeds: Iterable[int]) -> AttentionCheck:
     """Run a scenario with perfect perception and return what its people looked at.
 
     Raises:
@@ -189,9 +189,9 @@ def check_attention(template: ScenarioTemplate, seeds: Iterable[int]) -> Attenti
     # Nobody is asked to look: what people do by themselves counts.
     policy = AwarenessPolicy.preset("balanced").model_copy(update={"attention": None})
     return AttentionCheck.of(
-        template,
+        scenario,
         (
-            run_crossing(template.for_seed(seed), policy=policy, perception="truth", seed=seed)
+            run_crossing(scenario.draw(seed), policy=policy, perception="truth", seed=seed)
             for seed in seeds
         ),
     )

@@ -30,32 +30,12 @@ _N: Final = 2.0
 _N_PRIME: Final = 3.0
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """The outcome of an episode, and what it is compared with.
-
-    None stands for a figure that is not known, as in a file that does not hold it.
-
-    Attributes:
-        success: the goal was reached and nobody was hit.
-        time_to_goal_s: None when the goal was not reached, too.
-        reference_time_s: time to goal of the same planner in the empty hall.
-        reference_length_m: length of the path that it drove there.
-        human_delay_s: delay of all people so far, over their walks without a robot.
-    """
-
-    success: bool | None = None
-    time_to_goal_s: float | None = None
-    reference_time_s: float | None = None
-    reference_length_m: float | None = None
-    human_delay_s: float | None = None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class SocialEpisode:
     """The course of an episode: N instants, P people, all in one fixed frame (odom).
 
-    A person who is not there at an instant has NaN in all arrays of people.
+    A person who is not there at an instant has NaN in all arrays of people. None stands for a
+    figure that is not known, as in a file that does not hold it.
 
     Attributes:
         t_s: (N,) increasing.
@@ -75,8 +55,12 @@ class SocialEpisode:
         walls_m: (W, 4) straight walls x1, y1, x2, y2; the sides of racks are walls as well.
         boxes_m: (B, 4) x_min, y_min, x_max, y_max of what fills its box; their sides are in
             ``walls_m``.
-        outcome: success, times and reference.
         name: a text that identifies the episode.
+        success: the goal was reached and nobody was hit.
+        time_to_goal_s: None when the goal was not reached, too.
+        reference_time_s: time to goal of the same planner in the empty hall.
+        reference_length_m: length of the path that it drove there.
+        human_delay_s: delay of all people so far, over their walks without a robot.
 
     Raises:
         SimError: a wrong shape, times that do not increase, or a number that is not finite.
@@ -97,8 +81,12 @@ class SocialEpisode:
     goal_tolerance_m: float = 0.25
     walls_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
     boxes_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
-    outcome: Outcome = Outcome()
     name: str = ""
+    success: bool | None = None
+    time_to_goal_s: float | None = None
+    reference_time_s: float | None = None
+    reference_length_m: float | None = None
+    human_delay_s: float | None = None
 
     def __post_init__(self) -> None:
         t_s = finite_array("t_s", self.t_s, ("N",), SimError)

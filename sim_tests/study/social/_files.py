@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,6 +28,11 @@ FORMATS: Final = {"socnav3": ".json", "navwareset": ".csv"}
 # Cells of SocNav3's occupancy grid, and the free space about the path of a grid without walls.
 _CELL_M: Final = 0.1
 _MARGIN_M: Final = 2.0
+# Fields of an episode for which the layout has no place.
+_OUTCOME: Final = (
+    *("success", "time_to_goal_s", "reference_time_s", "reference_length_m", "human_delay_s"),
+    *("robot_radius_m", "person_radius_m"),
+)
 # The text of NavWareSet takes 0.4 m for both bodies together.
 _NAVWARE_RADIUS_M: Final = 0.2
 # A slower body of a track keeps its heading.
@@ -100,11 +104,7 @@ def _socnav3_text(episode: SocialEpisode) -> str:
         "metadata": episode.name,
         "grid": _grid(episode),
         "walls": episode.walls_m.tolist(),
-        "awarenav": {
-            **asdict(episode.outcome),
-            "robot_radius_m": episode.robot_radius_m,
-            "person_radius_m": episode.person_radius_m,
-        },
+        "awarenav": {name: getattr(episode, name) for name in _OUTCOME},
         "sequence": frames,
     }
     return json.dumps(document, ensure_ascii=False) + "\n"

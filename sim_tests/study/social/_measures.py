@@ -115,17 +115,15 @@ def _zones(source: Source, name: str, published: str, value: Callable[..., float
 @_measure("general", "SPL", "higher")
 def spl(episode: SocialEpisode) -> float | None:
     """Success weighted by path length."""
-    outcome = episode.outcome
     return success_weighted(
-        outcome.success, path_length_m(episode.robot_m), outcome.reference_length_m
+        episode.success, path_length_m(episode.robot_m), episode.reference_length_m
     )
 
 
 @_measure("general", "STL", "higher")
 def stl(episode: SocialEpisode) -> float | None:
     """Success weighted by time."""
-    outcome = episode.outcome
-    return success_weighted(outcome.success, outcome.time_to_goal_s, outcome.reference_time_s)
+    return success_weighted(episode.success, episode.time_to_goal_s, episode.reference_time_s)
 
 
 @_measure("general", "Path Irregularity")
@@ -202,7 +200,7 @@ _zones("general", "{}_distance_s", "time in {} distance", _zone_s)
 # Over the walks without a robot; means of all people as NavWareSet takes them.
 _figures(
     "general",
-    ("human_delay_s", "human delay", "lower", lambda e: e.outcome.human_delay_s),
+    ("human_delay_s", "human delay", "lower", lambda e: e.human_delay_s),
     ("people_acceleration_mps2", "Aavg, of people", "lower", lambda e: people_motion(e)[0]),
     ("people_jerk_mps3", "Javg, of people", "lower", lambda e: people_motion(e)[1]),
 )

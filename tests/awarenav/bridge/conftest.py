@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from local_dds import own_domain
 from paths import ROOT
+from rendered_image import RenderedImage, rendered
 
 from nav_adapter.ros2 import RobotFile
 
@@ -12,6 +13,12 @@ from nav_adapter.ros2 import RobotFile
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch) -> int:
     return own_domain(monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> RenderedImage:
+    pytest.importorskip("pybullet", reason="the extra sim is not installed")
+    return rendered(tmp_path_factory.mktemp("render"))
 
 
 @pytest.fixture

@@ -7,9 +7,8 @@ import pytest
 from paths import ROOT
 
 pytest.importorskip("rerun", reason="the extra viz is not installed")
-pytest.importorskip("pybullet", reason="the extra sim is not installed")
 
-from rendered_image import odometry, rendered
+from rendered_image import RenderedImage, odometry
 
 from awarenav.bridge._rerun import RerunRecorder, cone_lines
 from awarenav.errors import AwarenavError
@@ -20,9 +19,10 @@ from perception import AttentionCone
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
 
 
-def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(tmp_path: Path) -> None:
+def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(
+    scene: RenderedImage, tmp_path: Path
+) -> None:
     path = tmp_path / "run.rrd"
-    scene = rendered(tmp_path / "render")
     bridge = AwarenessBridge(
         AwarenessPolicy.preset("balanced"),
         RobotFile.from_yaml(ROBOT).profile(),
@@ -37,6 +37,8 @@ def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(tmp_path: Path) 
             assert bridge.on_image(scene.image(now), now)
             recorder.draw_frame(bridge)
             recorder.draw(bridge, bridge.tick(now))
+    with pytest.raises(AwarenavError, match="there is no folder"):
+        RerunRecorder(tmp_path / "nowhere" / "run.rrd", 1.0)
     data = path.read_bytes()
     assert data.startswith(b"RRF")
     for entity in (
@@ -58,8 +60,3 @@ def test_a_cone_is_drawn_about_the_gaze_with_its_half_angle() -> None:
         assert np.allclose(off @ direction, 0.5)
         assert all(np.array_equal(edge[0], apex) for edge in edges)
         assert np.allclose(axis[1] - apex, direction)
-
-
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(AwarenavError, match="there is no folder"):
-        RerunRecorder(tmp_path / "nowhere" / "run.rrd", 1.0)

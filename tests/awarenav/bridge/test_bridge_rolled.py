@@ -7,10 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from paths import ROOT
-
-pytest.importorskip("pybullet", reason="the extra sim is not installed")
-
-from rendered_image import odometry, rendered
+from rendered_image import odometry
 
 from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import AwarenessBridge, CameraMount, RobotFile
@@ -18,11 +15,6 @@ from perception import AwarenessPipeline
 from perception.turn import QuarterTurn
 
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory):
-    return rendered(tmp_path_factory.mktemp("render"))
 
 
 def tracked(scene, T_base_camera):

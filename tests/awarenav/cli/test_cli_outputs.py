@@ -147,7 +147,6 @@ def test_commands_are_completed_with_their_help_and_without_importing_them():
         (["models", "fetch", "--ou"], ["--out"]),
         (["crossings", "--scenario", "crowd"], ["crowd_of_eight"]),
         (["crossings", "--policy", "b"], ["balanced", "blind"]),
-        (["crossings", "--policy", "sc"], ["scanner", "scanner_warning"]),
         (["crossings", "--fault", "gh"], ["ghosts"]),
         (["crossings", "--camera", "su"], ["surround"]),
         (["crossings", "--perception", "k"], ["keypoints"]),
@@ -162,9 +161,6 @@ def test_words_are_completed_by_their_beginning(words, names):
     assert values(*words) == names
 
 
-@pytest.mark.parametrize(
-    ("words", "kind"),
-    [(["crossings", "--policy", "./mi"], "file"), (["crossings", "--out", ""], "dir")],
-)
-def test_paths_are_left_to_the_shell(words, kind):
-    assert [item.type for item in offered(*words)] == [kind]
+def test_paths_are_left_to_the_shell():
+    assert [item.type for item in offered("crossings", "--policy", "./mi")] == ["file"]
+    assert [item.type for item in offered("crossings", "--out", "")] == ["dir"]

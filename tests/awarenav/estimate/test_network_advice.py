@@ -136,20 +136,14 @@ def unnamed(tmp_path: Path) -> Path:
     return network(tmp_path / "end2end.onnx", (1, 3, 64, 64), dets=zeros(1, 1, 5), labels=labels)
 
 
-@pytest.mark.parametrize(("family", "layout"), [("rtmdet", "RTMDet"), ("yolox", "YOLOX with NMS")])
-def test_a_prefix_tells_it(unnamed: Path, family: str, layout: str) -> None:
-    networks = choose_networks(f"{family}:{unnamed}", "shipped", "pnp")
-    assert networks.detector.layout == layout  # type: ignore[union-attr]
-
-
-@pytest.mark.parametrize(
-    ("prefix", "error", "message"),
-    [
+def test_a_prefix_tells_it_and_another_or_none_is_refused(unnamed: Path) -> None:
+    for family, layout in (("rtmdet", "RTMDet"), ("yolox", "YOLOX with NMS")):
+        networks = choose_networks(f"{family}:{unnamed}", "shipped", "pnp")
+        assert networks.detector.layout == layout  # type: ignore[union-attr]
+    for prefix, error, message in (
         ("", PerceptionError, "--detector rtmdet:FILE or yolox:FILE"),
         ("ultralytics:", PerceptionError, "--detector rtmdet:FILE or yolox:FILE"),
         ("yolo:", AwarenavError, "there is no file 'yolo:"),
-    ],
-)
-def test_another_prefix_or_none_is_refused(unnamed: Path, prefix, error, message) -> None:
-    with pytest.raises(error, match=message):
-        choose_networks(f"{prefix}{unnamed}", "shipped", "pnp")
+    ):
+        with pytest.raises(error, match=message):
+            choose_networks(f"{prefix}{unnamed}", "shipped", "pnp")

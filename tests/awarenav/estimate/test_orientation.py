@@ -123,19 +123,18 @@ def test_a_calibration_that_may_be_for_the_pixels_as_stored_is_refused(tmp_path,
     assert people[0] == people[1] != []
 
 
-def test_the_size_of_a_quarter_turn_tells_that_the_calibration_fits(tmp_path: Path) -> None:
+def test_the_size_of_a_quarter_turn_fits_and_depth_of_a_picture_upside_down_is_refused(
+    tmp_path: Path,
+) -> None:
     out = tmp_path / "a.jsonl"
     assert estimate(NumberReader(), turned_folder(tmp_path / "a", 6, CAMERA), "--out", out) == 0
     assert len(read_records(out)) == 2
-
-
-def test_depth_of_a_picture_upside_down_is_refused(tmp_path: Path) -> None:
     source = turned_folder(tmp_path / "set", 3, None)
     (tmp_path / "depth").mkdir()
     for number in range(2):
         depth = np.full((HEIGHT, WIDTH), 3000, np.uint16)
         assert cv2.imwrite(str(tmp_path / f"depth/{number:06d}.png"), depth)
-    arguments = ["--depth", tmp_path / "depth", "--fov-deg", 60, "--out", tmp_path / "a.jsonl"]
+    arguments = ["--depth", tmp_path / "depth", "--fov-deg", 60, "--out", tmp_path / "b.jsonl"]
     with pytest.raises(AwarenavError, match="depth image may be for the pixels as stored"):
         estimate(NumberReader(), source, *arguments)
 

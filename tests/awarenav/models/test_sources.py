@@ -15,6 +15,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from model_files import entry, names, sha256, store_of, zipped
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
@@ -24,18 +25,6 @@ from perception.named import Catalogue, RealModel
 # Not networks, but their sha256 tells them apart as it does networks.
 BOXES, POINTS, OTHER = b"boxes" * 1000, b"points" * 1000, b"others" * 1000
 WHEEL = "fake_nets-1.0-py3-none-any.whl"
-
-
-def sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
-
-
-def zipped(files: dict[str, bytes]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, content in files.items():
-            archive.writestr(name, content)
-    return buffer.getvalue()
 
 
 def wheel(path: Path, version: str = "1.0", boxes: bytes = BOXES) -> Path:
@@ -67,22 +56,6 @@ def tgz(path: Path, files: dict[str, bytes]) -> Path:
     return path
 
 
-def entry(name: str, content: bytes, *sources: dict[str, object], **changes: object) -> RealModel:
-    facts = {
-        "name": name,
-        "role": "detector",
-        "sources": sources,
-        "sha256": sha256(content),
-        "size_mb": 1.0,
-        "licence": "Apache-2.0",
-        "licence_page": "https://example.org",
-        "trained_on": "nothing",
-        "publisher": "nobody",
-        "purpose": "tests",
-    }
-    return RealModel.model_validate(facts | changes)
-
-
 PIP_BOXES = {"wheel": "fake-nets==1.0", "member": "fake_nets/models/boxes.tflite"}
 PIP_POINTS = {"wheel": "fake-nets==1.0", "member": ["fake_nets/models/pose.task", "points.tflite"]}
 GONE = {"url": "http://127.0.0.1:9/published_boxes.tflite"}
@@ -90,7 +63,7 @@ NETWORKS = (entry("boxes", BOXES, PIP_BOXES, GONE), entry("points", POINTS, PIP_
 
 
 def store(folder: Path, *networks: RealModel) -> ModelStore:
-    return ModelStore(folder, Catalogue(models=networks or NETWORKS))
+    return store_of(folder, *(networks or NETWORKS))
 
 
 @pytest.fixture
@@ -105,10 +78,6 @@ def index(tmp_path, monkeypatch):
     monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
     monkeypatch.setattr(_sources, "_RETRIES", 0)
     return folder
-
-
-def names(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()} if folder.exists() else set()
 
 
 def refusal(nets: ModelStore, *wanted: str, origin: Path | None = None) -> str:

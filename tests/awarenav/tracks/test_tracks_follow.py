@@ -74,24 +74,23 @@ def test_late_frames_within_the_lag_give_the_tracks_of_sorted_frames(tmp_path):
     assert any("late frames put back" in remark for remark in late.remarks)
 
 
-def test_frames_that_come_too_late_are_counted_and_change_nothing(tmp_path):
+@pytest.mark.parametrize(
+    ("at", "ahead_s", "remark"),
+    [
+        (25, 0.0, "1 late frame refused"),
+        (5, 4.0, "1 frame far ahead of those that follow: not used"),
+    ],
+)
+def test_a_frame_far_too_late_or_ahead_is_counted_and_changes_nothing(
+    tmp_path, at, ahead_s, remark
+):
     records = lines(WALKERS, frames=30)
-    without = [record for k, record in enumerate(records) if k != 5]
-    late = [*without[:25], records[5], *without[25:]]
-    run = track_recording(recorded(tmp_path, late))
-    assert drawn(run) == drawn(track_recording(recorded(tmp_path, without, "without.jsonl")))
-    assert any(remark.startswith("1 late frame refused") for remark in run.remarks)
-    assert len(run.camera_stamps_s) == len(without)
-
-
-def test_a_frame_far_ahead_is_counted_and_changes_nothing(tmp_path):
-    records = lines(WALKERS, frames=30)
-    without = [record for k, record in enumerate(records) if k != 12]
-    wrong = [*records[:12], {**records[12], "stamp_s": records[12]["stamp_s"] + 4.0}]
-    run = track_recording(recorded(tmp_path, [*wrong, *records[13:]]))
-    assert drawn(run) == drawn(track_recording(recorded(tmp_path, without, "without.jsonl")))
-    assert "1 frame far ahead of those that follow: not used" in run.remarks
-    assert len(run.camera_stamps_s) == len(without)
+    wrong = {**records[5], "stamp_s": records[5]["stamp_s"] + ahead_s}
+    del records[5]
+    run = track_recording(recorded(tmp_path, [*records[:at], wrong, *records[at:]]))
+    assert drawn(run) == drawn(track_recording(recorded(tmp_path, records, "without.jsonl")))
+    assert any(each.startswith(remark) for each in run.remarks)
+    assert len(run.camera_stamps_s) == len(records)
 
 
 def test_the_path_of_the_camera_is_where_it_looks(tmp_path):

@@ -36,26 +36,10 @@ def history(samples, died_s=None):
     return made
 
 
-def spans(seen, died_s=None):
-    """Unseen spans of a track with a frame every 0.1 s."""
-    samples = [sample(0.1 * k, seen=shown) for k, shown in enumerate(seen)]
-    return [pytest.approx(span) for span in history(samples, died_s).unseen_spans()]
-
-
-@pytest.mark.parametrize(
-    ("seen", "died_s", "expected"),
-    [
-        ([True] * 6, None, []),
-        ([True, True, False, False, True], None, [(0.1, 0.4)]),
-        ([True, False, False], None, [(0.0, 0.2)]),
-        ([True, False, False], 0.3, [(0.0, 0.3)]),
-    ],
-)
-def test_a_span_goes_from_the_last_sight_to_the_next_or_to_the_end(seen, died_s, expected):
-    assert spans(seen, died_s) == expected
-
-
-def test_a_pause_of_the_camera_is_time_unseen_and_an_interval_between_frames_is_not():
+def test_a_span_goes_to_the_end_and_a_pause_of_the_camera_is_one_but_no_interval_of_frames():
+    for died_s, end_s in ((None, 0.2), (0.3, 0.3)):
+        gone = history([sample(0.1 * k, seen=k == 0) for k in range(3)], died_s)
+        assert list(gone.unseen_spans()) == [(0.0, end_s)]
     slow = history([sample(0.0), sample(0.2, seen=False, is_frame=False), sample(0.4)])
     assert list(slow.unseen_spans()) == []
     paused = history([sample(0.0), sample(0.5, seen=False, is_frame=False), sample(1.0)])
@@ -86,12 +70,9 @@ def test_segments_join_without_a_gap_and_have_one_status_each(statuses):
         assert {each.status for each in run} == {status}
 
 
-def test_a_person_of_the_file_who_comes_back_gets_a_new_segment():
+def test_who_comes_back_gets_a_new_segment_and_means_leave_out_what_is_not_known():
     made = history([sample(stamp_s, status="given") for stamp_s in (0.0, 0.1, 0.2, 2.0, 2.1)])
     assert [len(run) for _, run in made.segments()] == [3, 2]
-
-
-def test_means_are_over_frames_and_leave_out_what_is_not_known():
     made = history(
         [
             sample(0.0, awareness=0.2),

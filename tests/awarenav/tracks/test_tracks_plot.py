@@ -54,7 +54,7 @@ def test_the_ellipse_is_two_standard_deviations_away_in_every_direction(first, s
     assert math.sqrt(away @ np.linalg.solve(covariance, away)) == pytest.approx(2.0, rel=1e-6)
 
 
-def test_the_field_of_view_is_that_of_the_camera():
+def test_the_field_of_view_is_that_of_the_camera(tmp_path):
     right, left = view_edges_rad(CAMERA)
     assert (right, left) == pytest.approx((-math.radians(35.0), math.radians(35.0)), abs=1e-3)
     # A principal point left of the middle sees farther to the right.
@@ -62,9 +62,7 @@ def test_the_field_of_view_is_that_of_the_camera():
     right, left = view_edges_rad(aside)
     assert math.tan(left) == pytest.approx(220.0 / 500.0)
     assert math.tan(right) == pytest.approx(-420.0 / 500.0)
-
-
-def test_the_field_of_view_is_drawn_where_the_camera_looks(tmp_path):
+    # It is drawn where the camera looks.
     records = lines([], frames=20, camera=lambda stamp_s: pose(1.0, 2.0, 0.5))
     figure = tracks_figure(tracks_in_file(recorded(tmp_path, records)), "still", camera=CAMERA)
     (wedge,) = [each for each in figure.axes[0].patches if isinstance(each, Wedge)]
@@ -127,13 +125,12 @@ def test_tracks_without_a_panel_are_counted_in_a_note(tmp_path):
     assert note in texts(tracks_figure(run, "crowd", most=5))
 
 
-def test_a_file_without_frames_gives_an_empty_plot(tmp_path):
-    figure = tracks_figure(track_recording(recorded(tmp_path, [])), "nothing")
-    assert "no people in 0 frames" in texts(figure)
-    figure.canvas.draw()
-
-
-def test_positions_without_a_camera_have_no_panels_of_awareness(tmp_path):
+def test_nobody_and_one_frame_are_drawn_and_positions_have_no_panels_of_awareness(tmp_path):
+    for frames, said in enumerate(("no people in 0 frames", "never confirmed")):
+        run = track_recording(recorded(tmp_path, lines([standing(3, 0)], frames=frames)))
+        figure = tracks_figure(run, "one")
+        figure.canvas.draw()
+        assert any(said in text for text in texts(figure))
     path = tmp_path / "people.csv"
     rows = [f"{0.1 * k:.1f},{id},{0.1 * k:.2f},{2.0 * id}" for k in range(20) for id in (1, 2)]
     path.write_text("\n".join(["t_s,id,x_m,y_m", *rows]) + "\n")
@@ -144,16 +141,11 @@ def test_positions_without_a_camera_have_no_panels_of_awareness(tmp_path):
     figure.canvas.draw()
 
 
-def test_one_frame_of_one_person_is_drawn(tmp_path):
-    figure = tracks_figure(
-        track_recording(recorded(tmp_path, lines([standing(3, 0)], frames=1))), "one"
+def test_a_panel_has_the_lower_bound_one_standard_deviation_and_spans_without_sight(tmp_path):
+    hidden = lines(
+        [standing(3.0, 0.0)], awareness=lambda t: 0.7, hidden=lambda k, who: 15 <= k < 25
     )
-    figure.canvas.draw()
-    assert any("never confirmed" in text for text in texts(figure))
-
-
-def test_the_thick_line_is_the_lower_bound_and_the_band_is_one_standard_deviation(tmp_path):
-    run = track_recording(recorded(tmp_path, lines([standing(3.0, 0.0)], awareness=lambda t: 0.7)))
+    run = track_recording(recorded(tmp_path, hidden))
     (history,) = run.histories
     panel = tracks_figure(run, "one").axes[1]
     curves = [each for each in panel.lines if len(each.get_xdata()) == len(history.samples)]
@@ -161,18 +153,12 @@ def test_the_thick_line_is_the_lower_bound_and_the_band_is_one_standard_deviatio
     np.testing.assert_array_equal(thickest.get_ydata(), history.values("awareness_lower"))
     (band,) = panel.collections
     stamp_s, alpha, std = (
-        history.stamps_s[20],
-        history.samples[20].awareness,
-        history.samples[20].awareness_std,
+        history.stamps_s[10],
+        history.samples[10].awareness,
+        history.samples[10].awareness_std,
     )
     edge = band.get_paths()[0].vertices
     rows = edge[np.isclose(edge[:, 0], stamp_s)][:, 1]
     assert (rows.min(), rows.max()) == pytest.approx((alpha - std, min(alpha + std, 1.0)))
-
-
-def test_shaded_spans_are_those_in_which_nobody_saw_the_person(tmp_path):
-    records = lines([standing(3.0, 0.0)], hidden=lambda k, who: 15 <= k < 25)
-    run = track_recording(recorded(tmp_path, records))
-    panel = tracks_figure(run, "gap").axes[1]
     spans = [(each.get_x(), each.get_x() + each.get_width()) for each in panel.patches]
     assert spans == [pytest.approx((1.4, 2.5))]

@@ -9,7 +9,6 @@ import pytest
 from track_lines import lines, pose, recorded, standing
 
 from awarenav.errors import AwarenavError
-from awarenav.records import write_records
 from awarenav.tracks._recording import ASSUMED_POSITION_STD_M, read_recording
 
 RECORDS = lines([standing(4.0, 1.0)], frames=4)
@@ -21,32 +20,24 @@ def test_a_person_lands_where_they_stand(tmp_path):
         np.testing.assert_allclose(frame.positions_odom_m(), [[4.0, 1.0]], atol=1e-12)
 
 
-@pytest.mark.parametrize("cut", [1, 9, 60])
-def test_an_incomplete_last_line_is_left_out_with_a_remark(tmp_path, cut):
+def test_an_incomplete_last_line_is_left_out_with_a_remark_and_blank_ones_without(tmp_path):
     path = tmp_path / "estimates.jsonl"
-    write_records(path, RECORDS)
-    path.write_text(path.read_text("utf-8").rstrip("\n")[:-cut], "utf-8")
-    recording = read_recording(path)
-    assert len(recording.frames) == len(RECORDS) - 1
-    assert recording.remarks == ("the last line is incomplete and is left out",)
+    text = "\n" + "\n\n".join(json.dumps(each) for each in RECORDS)
+    for end, count, remarks in (
+        ("\n \n", len(RECORDS), ()),
+        ("\n{", len(RECORDS), ("the last line is incomplete and is left out",)),
+    ):
+        path.write_text(text + end, "utf-8")
+        recording = read_recording(path)
+        assert (len(recording.frames), recording.remarks) == (count, remarks)
 
 
-def test_blank_lines_are_not_incomplete_lines(tmp_path):
-    path = tmp_path / "estimates.jsonl"
-    path.write_text("\n" + "\n\n".join(json.dumps(each) for each in RECORDS) + "\n \n", "utf-8")
-    recording = read_recording(path)
-    assert (len(recording.frames), recording.remarks) == (len(RECORDS), ())
-
-
-def test_without_any_pose_the_camera_is_fixed(tmp_path):
+def test_without_any_pose_the_camera_is_fixed_and_a_frame_without_one_is_left_out(tmp_path):
     recording = recorded(tmp_path, [{**each, "T_odom_camera": None} for each in RECORDS])
     assert all((each.T_odom_camera[:2, 3] == 0.0).all() for each in recording.frames)
     # Level and looking along odom x: the camera's right is odom's −y, its forward is odom's x.
     np.testing.assert_allclose(recording.frames[0].T_odom_camera[:3, :3], pose()[:3, :3])
     assert "assumed to be fixed" in recording.remarks[0]
-
-
-def test_a_frame_without_a_pose_among_others_is_left_out(tmp_path):
     recording = recorded(
         tmp_path, [RECORDS[0], {**RECORDS[1], "T_odom_camera": None}, *RECORDS[2:]]
     )
@@ -61,23 +52,16 @@ def with_person(**change):
     return [{**RECORDS[0], "people": [person]}]
 
 
-def test_a_truth_file_has_neither_scores_nor_covariances(tmp_path):
+def test_values_that_a_person_lacks_are_assumed_or_no_evidence_or_leave_the_person_out(tmp_path):
     recording = recorded(tmp_path, with_person(position_covariance_m2=None, awareness_std=0.0))
     (seen,) = recording.frames[0].observations
-    assert seen.score == 1.0
+    assert (seen.score, seen.awareness, seen.awareness_std) == (1.0, 0.9, 0.0)
     np.testing.assert_allclose(seen.position_covariance_m2, ASSUMED_POSITION_STD_M**2 * np.eye(3))
-    assert (seen.awareness, seen.awareness_std) == (0.9, 0.0)
     assert recording.without_covariance == 1
-
-
-def test_awareness_without_a_standard_deviation_is_no_evidence(tmp_path):
     recording = recorded(tmp_path, with_person(awareness=1.0, awareness_std=None))
     (seen,) = recording.frames[0].observations
     assert (seen.awareness, seen.awareness_std) == (None, None)
     assert "counts as no evidence" in recording.remarks[0]
-
-
-def test_a_person_without_a_position_is_left_out(tmp_path):
     recording = recorded(tmp_path, with_person(position_camera_m=None))
     assert recording.frames[0].observations == ()
     assert recording.remarks == ("1 observation without position_camera_m left out",)

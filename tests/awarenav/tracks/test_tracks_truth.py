@@ -47,40 +47,28 @@ def test_a_track_that_changes_to_another_person_matches_both(tmp_path):
     assert person_ids_text(matches[1]) == "1, 0"
 
 
-def test_a_track_far_from_everybody_matches_nobody(tmp_path):
-    truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], named=True)))
-    near = tracks_in_file(
-        recorded(tmp_path, lines([standing(4.0, 0.99)], named=True), "near.jsonl")
-    )
-    far = tracks_in_file(recorded(tmp_path, lines([standing(4.0, 1.01)], named=True), "far.jsonl"))
-    assert len(match_truth(near.histories, truth)[0]) == 40
-    assert match_truth(far.histories, truth)[0] == []
-    assert person_ids_text([]) == "–"
-
-
-def test_a_far_track_does_not_take_a_near_ones_person(tmp_path):
-    truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], named=True)))
-    both = [standing(4.0, 0.1), standing(40.0, 0.0)]
-    run = tracks_in_file(recorded(tmp_path, lines(both, named=True), "both.jsonl"))
+@pytest.mark.parametrize(
+    ("places", "late_s", "counts"),
+    [
+        ([standing(4.0, 0.99)], 0.0, [4]),
+        ([standing(4.0, 1.01)], 0.0, [0]),
+        # A far track does not take a near one's person.
+        ([standing(4.0, 0.1), standing(40.0, 0.0)], 0.0, [4, 0]),
+        ([standing(4.0, 0.0)], 0.02, [4]),
+        ([standing(4.0, 0.0)], 0.05, [0]),
+    ],
+)
+def test_a_track_matches_somebody_near_at_its_instant(tmp_path, places, late_s, counts):
+    unknown = lines([standing(4.0, 0.0)], frames=4, named=True, awareness=lambda t: None)
+    truth = true_people(recorded(tmp_path, unknown))
+    records = lines(places, frames=4, named=True)
+    for record in records:
+        record["stamp_s"] += late_s
+    run = tracks_in_file(recorded(tmp_path, records, "tracks.jsonl"))
     matches = match_truth(run.histories, truth)
-    assert (len(matches[0]), len(matches[1])) == (40, 0)
-
-
-def test_truth_with_another_stamp_is_not_matched(tmp_path):
-    truth = true_people(recorded(tmp_path, lines([standing(4.0, 0.0)], frames=4, named=True)))
-    for shift_s, count in ((0.02, 4), (0.05, 0)):
-        records = lines([standing(4.0, 0.0)], frames=4, named=True)
-        for record in records:
-            record["stamp_s"] += shift_s
-        run = tracks_in_file(recorded(tmp_path, records, "shifted.jsonl"))
-        assert len(match_truth(run.histories, truth)[0]) == count
-
-
-def test_truth_without_awareness_gives_nan(tmp_path):
-    records = lines([standing(4.0, 0.0)], named=True, awareness=lambda t: None)
-    truth = recorded(tmp_path, records)
-    matches = match_truth(tracks_in_file(truth).histories, true_people(truth))
-    assert all(math.isnan(alpha) for _, _, alpha in matches[0])
+    assert [len(matches[k]) for k in range(len(places))] == counts
+    assert all(math.isnan(alpha) for rows in matches.values() for _, _, alpha in rows)
+    assert person_ids_text([]) == "–"
 
 
 def test_a_truth_without_ids_is_refused(tmp_path):

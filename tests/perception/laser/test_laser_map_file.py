@@ -174,6 +174,9 @@ def test_a_map_file_that_makes_no_sense_is_refused(keys, text: str, tmp_path: Pa
     with pytest.raises(PerceptionError, match=text) as raised:
         MapCells.from_yaml(path)
     assert str(tmp_path) in str(raised.value)
+    path.write_text("[1, 2]\n")
+    with pytest.raises(PerceptionError, match=r"hall\.yaml must hold the keys image, resolution"):
+        MapCells.from_yaml(path)
 
 
 def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog) -> None:
@@ -213,10 +216,3 @@ def test_damage_to_an_image_never_crashes(
     except PerceptionError:
         return
     assert np.isfinite(found.cells_m).all()
-
-
-def test_a_file_that_is_no_map_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "list.yaml"
-    path.write_text("[1, 2]\n")
-    with pytest.raises(PerceptionError, match=r"list\.yaml must hold the keys image, resolution"):
-        MapCells.from_yaml(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -134,6 +135,7 @@ def test_moving_the_world_moves_the_points(x, y, yaw, speed, yaw_rate) -> None:
 RANGE_MAX_M = 4.0
 
 
+@functools.cache
 def seen_near_the_limit(nothing_m: float) -> int:
     """Return in how many of 40 scans somebody is found 15 cm within range_max, in a large hall."""
     detector, place, found = LegDetector(), np.array([3.85, 0.0]), 0

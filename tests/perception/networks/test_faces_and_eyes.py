@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from perception import Camera, HeadPose, PerceptionError, PersonDetection, PersonKeypoints
+from perception import Camera, HeadPose, PersonDetection, PersonKeypoints
 from perception.evidence import judge_face
-from perception.networks.faces import FaceMesh, FaceMeshPoseEstimator, iris_offset
+from perception.networks.faces import FaceMeshPoseEstimator, iris_offset
 from perception.networks.faces import _face_scores as face_scores
 
 
@@ -83,8 +83,3 @@ def test_lids_over_the_irises_leave_no_evidence_of_awareness(opening, reason):
     camera = Camera.from_fov(640, 480, math.radians(60.0))
     judged = judge_face(camera, person, head, 0.3)
     assert (judged if isinstance(judged, str) else None) == reason
-
-
-def test_another_file_than_the_bundle_of_faces_is_refused():
-    with pytest.raises(PerceptionError, match=r"not MediaPipe's face_landmarker\.task"):
-        FaceMesh(b"no ZIP archive")

@@ -33,7 +33,6 @@ from perception.networks.small_faces import RetinaFace
 from perception.ownership import iou
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
-FRAME = np.zeros((480, 640, 3), np.uint8)
 FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 PHOTOGRAPHS = SHARED / "images" / "dev"
 pytestmark = pytest.mark.slow
@@ -224,18 +223,6 @@ def test_eyes_of_a_near_worker_are_measured(files, scene):
         found.append(seen.angles_rad[0])
         assert (found[-1] - turn) ** 2 < 9.0 * seen.covariance_rad2[0, 0]
     assert 0.5 < np.polyfit(turns, found, 1)[0] < 1.5
-
-
-def test_the_networks_of_faces_run_once_for_a_face_and_its_eyes(files, scene, monkeypatch):
-    mesh, runs = FaceMesh(files[2]), []
-    image, person, _ = scene.shown(1.2, 0.0)
-    pose = FaceMeshPoseEstimator(Given(person), mesh)
-    find = mesh.find
-    monkeypatch.setattr(mesh, "find", lambda *given: runs.append(given) or find(*given))
-    pipeline = AwarenessPipeline(CAMERA, Given(person), pose, eye_estimator=FaceMeshEyeEstimator())
-    (seen,) = pipeline.process(image, 0.0)
-    assert (seen.eyes_seen, len(runs)) == (True, 1)
-    assert np.linalg.norm(seen.position_camera_m) == pytest.approx(1.2, rel=0.15)
 
 
 @pytest.mark.parametrize("distance_m", [1.2, 2.5, 4.5, 6.5])

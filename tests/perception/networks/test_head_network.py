@@ -220,13 +220,10 @@ def test_a_head_is_found_from_any_seen_keypoints(scores):
 # --- no head, and refusals ----------------------------------------------------------------------
 
 
-def test_a_crop_without_a_head_gives_no_pose():
+def test_crops_without_a_head_heads_outside_the_image_and_tiny_heads_have_no_pose():
     image, pixel = disc_at(np.array([0.0, 0.0, 2.0]))
     people = (person_about(pixel, CAMERA.fx_px / 2.0),)
     assert OnnxHeadPoseEstimator(disc_network(head=0.3)).estimate(image, CAMERA, people) == (None,)
-
-
-def test_heads_outside_the_image_and_tiny_heads_have_no_pose():
     estimator = OnnxHeadPoseEstimator(disc_network())
     image = np.zeros((480, 640, 3), np.uint8)
     assert estimator.estimate(image, CAMERA, ()) == ()

@@ -10,7 +10,6 @@ from sim_tests import Scenario
 from sim_tests.actors.behaviour import Hearing, PersonSpec
 from sim_tests.actors.body import load_worker
 from sim_tests.crossing import Stage
-from sim_tests.scenario import ScenarioTemplate
 
 
 def person(**fields: Any) -> dict[str, Any]:
@@ -29,7 +28,7 @@ def stage(*people: dict[str, Any], layout: str = "open") -> Stage:
         (lambda: Hearing(heard_within_m=20.0), "heard_within_m must be at most not_heard_beyond"),
         (lambda: Hearing.model_validate({"answer": 0.3}), "did you mean 'answers'"),
         (
-            lambda: ScenarioTemplate.shipped("late_glance").with_population("odd"),
+            lambda: Scenario.shipped("late_glance").with_population("odd"),
             "population must be one of classic, recorded, got 'odd'",
         ),
         (

@@ -30,7 +30,7 @@ def look_share(hearing: Hearing, *requests: Request) -> float:
 
 @pytest.mark.parametrize("answers", [0.0, 0.3, 1.0])
 def test_the_share_who_look_is_the_setting(answers: float) -> None:
-    share = look_share(CALM.with_numbers({"answers": answers}), VOICE)
+    share = look_share(CALM.model_copy(update={"answers": answers}), VOICE)
     assert share == pytest.approx(answers, abs=0.04)
 
 
@@ -46,7 +46,8 @@ def test_by_default_every_other_person_looks_and_one_in_twenty_startles() -> Non
 def test_the_same_people_answer_at_a_higher_share_too() -> None:
     """With one seed the answers are coupled: when and for how long stays the same."""
     low, mid, high = (
-        heard_by(CALM.with_numbers({"answers": share}), VOICE, VOICE) for share in (0.3, 0.5, 0.8)
+        heard_by(CALM.model_copy(update={"answers": share}), VOICE, VOICE)
+        for share in (0.3, 0.5, 0.8)
     )
     for few, more in ((low, mid), (mid, high)):
         assert all(b == a for a, b in zip(few, more, strict=True) if a is not None)
@@ -57,7 +58,7 @@ def test_the_same_people_answer_at_a_higher_share_too() -> None:
 
 
 def test_delay_and_duration_have_their_quartiles() -> None:
-    heard = [h for h in heard_by(CALM.with_numbers({"answers": 1.0}), VOICE) if h is not None]
+    heard = [h for h in heard_by(CALM.model_copy(update={"answers": 1.0}), VOICE) if h is not None]
     delays = np.quantile([h.from_s - VOICE.t_s for h in heard], [0.25, 0.5, 0.75])
     assert delays == pytest.approx([0.7 / 1.4, 0.7, 0.7 * 1.4], rel=0.05)
     looks = np.quantile([h.looks_for_s for h in heard], [0.25, 0.5, 0.75])
@@ -69,7 +70,7 @@ def test_delay_and_duration_have_their_quartiles() -> None:
 
 
 def test_every_request_within_a_minute_is_heard_less_and_a_quiet_minute_restores_it() -> None:
-    all_answer = CALM.with_numbers({"answers": 1.0, "habituation": 0.5})
+    all_answer = CALM.model_copy(update={"answers": 1.0, "habituation": 0.5})
     beeps = [replace(VOICE, t_s=5.0 * n) for n in range(3)]
     assert look_share(all_answer, *beeps[:1]) == 1.0
     assert look_share(all_answer, *beeps[:2]) == pytest.approx(0.5, abs=0.04)
@@ -96,7 +97,7 @@ def test_every_request_within_a_minute_is_heard_less_and_a_quiet_minute_restores
     ],
 )
 def test_what_makes_a_request_less_likely_to_be_answered(changes: dict, share: float) -> None:
-    all_answer = CALM.with_numbers({"answers": 1.0})
+    all_answer = CALM.model_copy(update={"answers": 1.0})
     assert look_share(all_answer, replace(VOICE, **changes)) == pytest.approx(share, abs=0.04)
 
 

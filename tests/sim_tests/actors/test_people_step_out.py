@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from staged_people import StageRun, run_stage
 
-from sim_tests import ScenarioTemplate
+from sim_tests import Scenario
 from sim_tests.actors.robot import NOVA_CARTER
 
 FRONT_M = float(NOVA_CARTER.footprint_m[:, 0].max())
@@ -92,8 +92,8 @@ def test_who_has_watched_looks_away_and_forgets_the_robot(population: str) -> No
 
 
 def test_the_shipped_ones_draw_the_moment_over_the_whole_approach() -> None:
-    template = ScenarioTemplate.shipped("steps_out_near")
-    drawn_m = [template.for_seed(seed).people[0].sets_off_within_m for seed in range(150)]
+    scenario = Scenario.shipped("steps_out_near")
+    drawn_m = [scenario.draw(seed).people[0].sets_off_within_m for seed in range(150)]
     assert 0.3 <= min(drawn_m) < 0.4
     assert 3.0 < max(drawn_m) <= 4.0
     assert np.quantile(drawn_m, [0.25, 0.75]) == pytest.approx([0.8, 1.8], abs=0.25)

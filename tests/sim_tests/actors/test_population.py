@@ -20,14 +20,14 @@ from sim_tests.actors.behaviour import (
 )
 from sim_tests.actors.behaviour._habits import GaitVariation, VariationFigures
 from sim_tests.crossing.planner import StraightOn
-from sim_tests.scenario import Scenario, ScenarioTemplate
+from sim_tests.scenario import Scenario
 from tracking.people import NOTICING_S
 
 NO_BOXES = np.zeros((0, 4))
 
 
 def short(name: str, duration_s: float = 7.5) -> Scenario:
-    return ScenarioTemplate.shipped(name).for_seed(1).model_copy(update={"duration_s": duration_s})
+    return Scenario.shipped(name).draw(1).model_copy(update={"duration_s": duration_s})
 
 
 def positions(scenario: Scenario, population: str | None = None) -> np.ndarray:
@@ -60,10 +60,10 @@ def test_recorded_people_repeat_with_their_seed() -> None:
 
 
 def test_a_scenario_keeps_its_tasks_among_recorded_people() -> None:
-    template = ScenarioTemplate.shipped("crossing_attentive").with_population("recorded")
-    (worker,) = template.median().people
-    assert (worker,) == ScenarioTemplate.shipped("crossing_attentive").median().people
-    assert ScenarioTemplate.from_text(template.median().to_text()).median() == template.median()
+    scenario = Scenario.shipped("crossing_attentive").with_population("recorded")
+    (worker,) = scenario.people
+    assert (worker,) == Scenario.shipped("crossing_attentive").people
+    assert Scenario.from_text(scenario.to_text()) == scenario
 
 
 def test_speed_and_looks_are_drawn_and_the_task_is_kept() -> None:

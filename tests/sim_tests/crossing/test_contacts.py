@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sim_tests import run_crossing
 from sim_tests.actors.robot import KinematicRobot, RobotModel
 from sim_tests.crossing._separations import Approach, ContactEvent
-from sim_tests.scenario import Scenario, ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.study.measures import measure
 from sim_tests.world import PERSON_GROUP, Warehouse
 from sim_tests.world.bullet import pybullet
@@ -136,7 +136,7 @@ class Drive:
 
 def scene(place: tuple[float, float] | None = None, heading_deg: float = 180.0, **changed: Any):
     """A hall with a person who stands at a place, and a robot at the origin."""
-    data = ScenarioTemplate.shipped("crossing_from_left").median().model_dump(mode="json")
+    data = Scenario.shipped("crossing_from_left").model_dump(mode="json")
     person = {"name": "stands", "heading_deg": heading_deg, "glances": {"notices_within_m": 0.0}}
     data["people"] = []
     if place is not None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planner_scenes import AISLE, DT_S, constraints
 
 from nav_adapter import RobotProfile, RobotState
-from sim_tests import ScenarioTemplate, run_crossing
+from sim_tests import Scenario, run_crossing
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing.planner import CostmapPlanner, ReferencePlanner
 from sim_tests.study.runs import plan_jobs, policy_of
@@ -79,7 +79,7 @@ def test_its_name_runs_it_beside_the_policy_of_today() -> None:
         ["reads_phone"], ["scanner"], [2000], planners=["costmap"], sensors=["scanner"]
     )
     assert (job.planner_text, job.policy, job.perception) == ("costmap", "scanner", "scanner")
-    scenario = ScenarioTemplate.shipped("reads_phone").for_seed(2000)
+    scenario = Scenario.shipped("reads_phone").draw(2000)
     blind, seeing = (
         run_crossing(
             scenario,

@@ -11,7 +11,6 @@ from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.conditions import CAMERAS, Perception
 from sim_tests.crossing import Stage
 from sim_tests.crossing.sensors import MapView, World, sensor_class
-from sim_tests.scenario import ScenarioTemplate
 
 NAMES = (*CAMERAS, "scanner", "keypoints+scanner", "pixels+scanner", "depth+scanner")
 
@@ -45,7 +44,7 @@ def test_a_scenario_without_scanners_is_refused_where_they_are_needed() -> None:
 def test_scanners_keep_somebody_who_has_left_the_picture() -> None:
     """Beside the robot the camera sees nobody; with scanners the track is fresh all the time."""
     unseen_s = {}
-    scenario = ScenarioTemplate.shipped("standing_in_aisle").for_seed(0)
+    scenario = Scenario.shipped("standing_in_aisle").draw(0)
     passing = scenario.model_copy(update={"duration_s": 8.0})
     for perception in ("keypoints", "keypoints+scanner"):
         result = run_crossing(passing, policy="balanced", perception=perception, seed=0)
@@ -91,7 +90,7 @@ CONE = AttentionCone()
 
 def test_the_oracle_sees_in_all_directions_but_not_through_racks() -> None:
     """Blind corner: the worker comes out of a cross aisle behind a rack."""
-    scenario = ScenarioTemplate.shipped("blind_corner").median()
+    scenario = Scenario.shipped("blind_corner")
     result = run_crossing(scenario, policy="balanced", perception="oracle")
     start = scenario.model_copy(update={"duration_s": 0.5})
     everywhere = run_crossing(start, policy="balanced", perception="truth")
@@ -115,7 +114,7 @@ def test_the_oracle_sees_in_all_directions_but_not_through_racks() -> None:
 
 
 def test_the_oracle_sees_everybody_who_is_not_hidden_by_a_high_box() -> None:
-    scenario = ScenarioTemplate.shipped("crowd_of_eight").median()
+    scenario = Scenario.shipped("crowd_of_eight")
     with Stage(scenario, np.random.default_rng(0)) as stage:
         view = MapView.of(stage.warehouse)
         T_odom_camera = stage.amr.T_odom_camera

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sim_tests import ScenarioTemplate, run_crossing
+from sim_tests import Scenario, run_crossing
 from sim_tests.crossing import RequestMemory
 
 
@@ -43,7 +43,7 @@ def test_what_alpha_says_itself_is_no_memory(lower, own, noticed):
 
 @pytest.mark.parametrize(("policy", "remembers"), [("balanced", True), ("conservative", False)])
 def test_a_robot_that_knows_the_truth_remembers_as_its_policy_says(policy, remembers):
-    scenario = ScenarioTemplate.shipped("crossing_attentive").for_seed(0)
+    scenario = Scenario.shipped("crossing_attentive").draw(0)
     short = scenario.model_copy(update={"duration_s": 6.0})
     result = run_crossing(short, policy=policy, perception="truth", seed=0)
     tracks = [track for frame in result.frames for track in frame.tracks]

@@ -17,8 +17,8 @@ from perception.surround import PanoramaLens, SurroundPipeline, ring_of_views
 from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
 from sim_tests.crossing import Stage
 from sim_tests.crossing.sensors import World, sensor_class
-from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
-from sim_tests.study.runs import named_templates, plan_jobs
+from sim_tests.scenario import CameraSpec, shipped_scenarios
+from sim_tests.study.runs import named_scenarios, plan_jobs
 
 CONE = AttentionCone()
 # Three workers around the robot: ahead at the left, at the border of two views; behind, across the
@@ -50,7 +50,7 @@ people:
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
     path = tmp_path_factory.mktemp("scenario") / "three.yaml"
     path.write_text(THREE)
-    return ScenarioTemplate.from_yaml(path).with_camera("surround").median()
+    return Scenario.from_yaml(path).with_camera("surround")
 
 
 def panorama(stage: Stage, T_odom_camera: np.ndarray, width_px: int) -> np.ndarray:
@@ -132,33 +132,33 @@ def test_a_surround_camera_reports_each_person_once_and_nobody_else(scenario: Sc
 
 
 def test_the_camera_of_a_scenario_can_be_replaced(tmp_path: Path) -> None:
-    for template in shipped_templates():
-        if template.name != "paper_encounter":  # it has a camera of its own
-            assert template.with_camera("forward").median() == template.median()
-        assert template.with_camera("") is template
-        around = template.with_camera("surround")
-        assert around.median().camera.views_deg == (0.0, 90.0, 180.0, -90.0)
-        assert around.id == template.id
-        assert around.parameters().keys() == template.parameters().keys()
+    for scenario in map(Scenario.shipped, shipped_scenarios()):
+        if scenario.name != "paper_encounter":  # it has a camera of its own
+            assert scenario.with_camera("forward") == scenario
+        assert scenario.with_camera("") is scenario
+        around = scenario.with_camera("surround")
+        assert around.camera.views_deg == (0.0, 90.0, 180.0, -90.0)
+        assert around.id == scenario.id
+        assert around.distributions.keys() == scenario.distributions.keys()
     own = tmp_path / "own.yaml"
     own.write_text("{width_px: 640, height_px: 480, horizontal_fov_deg: 60.0}")
-    template = ScenarioTemplate.shipped("runs_out").with_camera(str(own))
-    assert template.median().camera.width_px == 640
-    assert ScenarioTemplate.from_text(template.to_text()) == template
+    scenario = Scenario.shipped("runs_out").with_camera(str(own))
+    assert scenario.camera.width_px == 640
+    assert Scenario.from_text(scenario.to_text()) == scenario
     with pytest.raises(
         SimError, match=r"'surround2' is unknown; did you mean 'surround'.*'forward', 'surround'"
     ):
-        template.with_camera("surround2")
+        scenario.with_camera("surround2")
     own.write_text("{width: 640}")
     with pytest.raises(SimError, match="width_px"):
-        template.with_camera(str(own))
+        scenario.with_camera(str(own))
 
 
 def test_runs_and_searches_accept_a_camera() -> None:
     jobs = plan_jobs(["runs_out"], ["blind"], [0], camera="surround")
-    assert ScenarioTemplate.from_text(jobs[0].scenario_text).median().camera.mount == "top"
-    (template,) = named_templates(["runs_out"], camera="surround")
-    assert template.median().camera.mount == "top"
+    assert Scenario.from_text(jobs[0].scenario_text).camera.mount == "top"
+    (scenario,) = named_scenarios(["runs_out"], camera="surround")
+    assert scenario.camera.mount == "top"
 
 
 def test_impossible_views_are_refused() -> None:
@@ -171,8 +171,8 @@ def test_impossible_views_are_refused() -> None:
 @pytest.mark.slow
 def test_a_person_behind_the_robot_is_still_observed_and_nobody_twice() -> None:
     """A worker behind the robot is outside the view of the forward camera, not of this one."""
-    template = ScenarioTemplate.shipped("standing_in_aisle").with_camera("surround")
-    result = run_crossing(template.for_seed(0), policy="balanced", perception="keypoints")
+    scenario = Scenario.shipped("standing_in_aisle").with_camera("surround")
+    result = run_crossing(scenario.draw(0), policy="balanced", perception="keypoints")
     assert result.success
     behind = 0
     for frame in result.frames:

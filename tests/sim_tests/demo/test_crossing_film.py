@@ -32,7 +32,7 @@ SENSES = "keypoints+scanner"
 
 @pytest.fixture(scope="module")
 def scenario():
-    return Scenario.shipped("steps_out_in_aisle")
+    return Scenario.shipped("steps_out_in_aisle").with_values({})
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from sim_tests.demo._lanes import (
     run_lane,
     shown_seed,
 )
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 
 ROW = LaneRow(0, "awarenav", 12.0, 2.0, None, False, 0.80, 0.10, 0.90, 1.40, None, None)
 
@@ -39,7 +39,7 @@ def of_seeds(lost_s: list[float]) -> list[LaneRow]:
 
 def test_the_report_holds_every_robot_with_every_seed_of_this_version_of_the_scenario() -> None:
     about, rows = read_report()
-    assert about["scenario"] == ScenarioTemplate.shipped(_lanes.SCENARIO).id
+    assert about["scenario"] == Scenario.shipped(_lanes.SCENARIO).id
     assert [(row.seed, row.lane) for row in rows] == [
         (seed, lane.name) for seed in range(REPORTED) for lane in LANES
     ]

@@ -23,7 +23,7 @@ from sim_tests import ReferencePlanner, SimError, run_crossing  # noqa: E402
 from sim_tests.actors.robot import NOVA_CARTER  # noqa: E402
 from sim_tests.crossing import CrossingFrame  # noqa: E402
 from sim_tests.learning import CrossingEnv, PolicyPlanner  # noqa: E402
-from sim_tests.scenario import ScenarioTemplate  # noqa: E402
+from sim_tests.scenario import Scenario  # noqa: E402
 from sim_tests.world.bullet import pybullet  # noqa: E402
 
 
@@ -86,7 +86,7 @@ def test_a_policy_drives_the_same_in_the_environment_and_as_a_planner() -> None:
         limit = observation["robot"][2]
         return np.array([0.6 * limit / 1.5, np.clip(np.arctan2(y, x), -1, 1)], np.float32)
 
-    scenario = ScenarioTemplate.shipped("blind_corner").for_seed(1)
+    scenario = Scenario.shipped("blind_corner").draw(1)
     scenario = scenario.model_copy(update={"duration_s": 3.0})
     env = make(scenarios=scenario, scan_rays=12)
     observation, _ = env.reset(seed=1)
@@ -230,7 +230,7 @@ def test_every_physics_world_is_closed() -> None:
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
 def test_vectors_of_environments(mode: str) -> None:
-    short = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
+    short = Scenario.shipped("crossing_from_left").draw(0)
     short = short.model_copy(update={"duration_s": 0.2})
     envs = gymnasium.make_vec("awarenav/Crossing-v0", 2, vectorization_mode=mode, scenarios=short)
     observation, info = envs.reset(seed=4)

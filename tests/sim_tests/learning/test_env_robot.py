@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim_tests import SimError, run_crossing
-from sim_tests.scenario import Scenario, ScenarioTemplate
+from sim_tests.scenario import Scenario
 
 pytest.importorskip("gymnasium", reason="the environment needs the extra gym")
 
@@ -79,7 +79,7 @@ def test_wrong_arguments_are_refused(settings, message) -> None:
 
 def staged(**changed):
     """A scenario of a robot at the origin, heading along x, and somebody beside it."""
-    data = ScenarioTemplate.shipped("crossing_from_left").median().model_dump(mode="json")
+    data = Scenario.shipped("crossing_from_left").model_dump(mode="json")
     del data["robot_model"]
     person = {"name": "stands", "heading_deg": 180.0, "glances": {"notices_within_m": 0.0}}
     person |= {"route": [{"x_m": 0.05, "y_m": 0.53}], "social": False}

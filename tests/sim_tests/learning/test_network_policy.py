@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim_tests import NOVA_CARTER, ScenarioTemplate, SimError, run_crossing
+from sim_tests import NOVA_CARTER, Scenario, SimError, run_crossing
 from sim_tests.learning import LearnedPlanner, NetworkPolicy, ObservationEncoder, PolicyPlanner
 
 _SLOTS, _RAYS = 3, 4
@@ -117,7 +117,7 @@ def test_a_trained_model_gives_the_same_actions_as_its_copy() -> None:
 
 
 def test_the_policy_of_the_package_drives_to_the_goal() -> None:
-    scenario = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
+    scenario = Scenario.shipped("crossing_from_left").draw(0)
     planner = LearnedPlanner(NOVA_CARTER, scenario.planner_boxes_odom_m)
     assert isinstance(planner, PolicyPlanner)
     result = run_crossing(scenario, policy="balanced", planner=planner, seed=0)

@@ -14,11 +14,11 @@ from sim_tests import SimError, run_crossing
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing import StraightOn
 from sim_tests.learning import ObservationEncoder, PolicyPlanner
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 
 
 def test_a_policy_that_drives_straight_is_a_planner_that_drives_straight() -> None:
-    short = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
+    short = Scenario.shipped("crossing_from_left").draw(0)
     short = short.model_copy(update={"duration_s": 1.0})
     drives = [
         run_crossing(short, policy="balanced", planner=planner)

@@ -4,16 +4,16 @@ from paths import ROOT
 from PIL import Image
 
 from awarenav.cli import main
-from sim_tests import ScenarioTemplate, SimError, run_crossing, shipped_scenarios
+from sim_tests import Scenario, SimError, run_crossing, shipped_scenarios
 from sim_tests.actors.behaviour import PersonSpec
 from sim_tests.scenario import SCENARIO_SETS, RobotTask
 from sim_tests.scenario.catalogue import (
     approach_statistics,
     closest_approaches,
+    drawn_problems,
     person_plan,
     robot_plan,
     scenario_problems,
-    template_problems,
 )
 from sim_tests.study.scenarios._validate import AttentionCheck
 
@@ -26,23 +26,23 @@ SHIPPED = [name for each in SCENARIO_SETS for name in shipped_scenarios(each)]
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_scenarios_can_be_run_and_are_what_they_say(name):
-    template = ScenarioTemplate.shipped(name)
-    assert template_problems(template) == ()
-    assert template.median().duration_s <= 40.0
+    scenario = Scenario.shipped(name)
+    assert drawn_problems(scenario) == ()
+    assert scenario.duration_s <= 40.0
     if name in BESIDE:
         return
     # Robot and people would come close if nobody reacted, but not at the start.
-    statistics = approach_statistics(template, 100)
+    statistics = approach_statistics(scenario, 100)
     assert statistics is not None
     assert statistics.conflict_share >= 0.8
     assert statistics.median_time_s > 2.0
-    glances = [each.glances for each in template.median().people]
+    glances = [each.glances for each in scenario.people]
     notices_m = [each.notices_within_m for each in glances]
-    if template.attention == "attentive":
+    if scenario.attention == "attentive":
         assert all(each.watches for each in glances)
         assert min(notices_m) > 8.0
     else:
-        assert (max(notices_m) > 0.0) == (template.attention == "mixed")
+        assert (max(notices_m) > 0.0) == (scenario.attention == "mixed")
 
 
 def test_the_gallery_has_a_picture_of_every_scenario():
@@ -52,8 +52,7 @@ def test_the_gallery_has_a_picture_of_every_scenario():
 
 def test_crossings_from_left_and_right_are_mirror_images():
     left, right = (
-        ScenarioTemplate.shipped(f"crossing_from_{side}").for_seed(11).people[0]
-        for side in ("left", "right")
+        Scenario.shipped(f"crossing_from_{side}").draw(11).people[0] for side in ("left", "right")
     )
     assert left.route[0].y_m > 0.0 > right.route[0].y_m
     mirrored = tuple(point.model_copy(update={"y_m": -point.y_m}) for point in right.route)
@@ -100,14 +99,14 @@ def test_the_closest_approach_agrees_with_the_closed_form():
     }
     delay_s = (6.0 / 1.5 + 0.75) - (2.0 + 4.0 / 1.2)
     expected = abs(delay_s) * 1.5 * 1.2 / np.hypot(1.5, 1.2)
-    distance, _ = closest_approaches(ScenarioTemplate(data).median())["p"]
+    distance, _ = closest_approaches(Scenario.from_data(data))["p"]
     assert distance == pytest.approx(expected, abs=1e-3)
 
 
 def changed(name, **person):
-    data = ScenarioTemplate.shipped(name).median().model_dump()
+    data = Scenario.shipped(name).model_dump()
     data["people"][0].update(person)
-    return ScenarioTemplate(data).median()
+    return Scenario.from_data(data)
 
 
 def test_impossible_positions_are_reported():
@@ -141,17 +140,17 @@ def test_show_describes_what_varies_and_writes_yaml_that_can_be_read_back(capsys
     assert main(["scenario", "show", "stops_midway", "--yaml"]) == 0
     path = tmp_path / "mine.yaml"
     path.write_text(capsys.readouterr().out)
-    assert ScenarioTemplate.from_yaml(path) == ScenarioTemplate.shipped("stops_midway")
+    assert Scenario.from_yaml(path) == Scenario.shipped("stops_midway")
     assert main(["scenario", "show", "stops_midway", "--yaml", "--seed", "4"]) == 0
     path.write_text(capsys.readouterr().out)
-    drawn = ScenarioTemplate.shipped("stops_midway").for_seed(4)
-    assert ScenarioTemplate.from_yaml(path).median() == drawn
+    drawn = Scenario.shipped("stops_midway").draw(4)
+    assert Scenario.from_yaml(path) == drawn
     assert main(["scenario", "show", "stops_midway", "--seed", "4"]) == 2
 
 
 def test_validate_accepts_good_files_and_reports_bad_ones(capsys, tmp_path):
     good, bad, idle = (tmp_path / f"{name}.yaml" for name in ("good", "bad", "idle"))
-    text = ScenarioTemplate.shipped("reads_phone").to_text()
+    text = Scenario.shipped("reads_phone").to_text()
     good.write_text(text)
     bad.write_text(text.replace("x_m: 7.8", "x_m: 70.8"))
     idle.write_text(text.replace("low: 0.0", "low: 18.0").replace("high: 1.0", "high: 19.0"))
@@ -179,11 +178,11 @@ def test_drawings_are_reproducible(tmp_path, capsys):
         assert main(["scenario", "show", name, "--out", str(tmp_path / file)]) == 2
         assert not (tmp_path / file).exists()
     with pytest.raises(SimError, match="did you mean 'late_glance'"):
-        ScenarioTemplate.named("late_glanc")
+        Scenario.named("late_glanc")
 
 
 def test_the_lane_is_free_and_the_area_beyond_is_not():
-    scenario = ScenarioTemplate.shipped("crossing_from_left").median()
+    scenario = Scenario.shipped("crossing_from_left")
     hall = scenario.layout.obstacle_boxes_odom
     boxes = scenario.planner_boxes_odom_m
     np.testing.assert_array_equal(boxes[: len(hall)], hall)
@@ -192,10 +191,10 @@ def test_the_lane_is_free_and_the_area_beyond_is_not():
         for y, closed in ((0.0, False), (lane - 0.01, False), (lane + 0.01, True), (-4.0, True)):
             inside = (boxes[:, :2] < (x, y)).all(axis=1) & (boxes[:, 2:] > (x, y)).all(axis=1)
             assert inside.any() == closed
-    plain = ScenarioTemplate.shipped("crossing_attentive").median()
+    plain = Scenario.shipped("crossing_attentive")
     np.testing.assert_array_equal(plain.planner_boxes_odom_m, plain.layout.obstacle_boxes_odom)
     with pytest.raises(SimError, match="needs a start and goal along odom x or y"):
-        ScenarioTemplate(
+        Scenario.from_data(
             {
                 "name": "a",
                 "duration_s": 5.0,
@@ -206,8 +205,8 @@ def test_the_lane_is_free_and_the_area_beyond_is_not():
 
 def test_a_lane_along_y_is_the_rotated_lane_along_x():
     task = {"goal_x_m": 0.0, "goal_y_m": 4.0, "lane_half_width_m": 1.0}
-    turned = ScenarioTemplate({"name": "a", "duration_s": 5.0, "layout": "open", "robot": task})
-    beyond = turned.median().planner_boxes_odom_m[-2:]
+    turned = Scenario.from_data({"name": "a", "duration_s": 5.0, "layout": "open", "robot": task})
+    beyond = turned.planner_boxes_odom_m[-2:]
     np.testing.assert_allclose(beyond, [[-5.0, -7.0, -1.0, 7.0], [1.0, -7.0, 14.0, 7.0]])
 
 
@@ -215,11 +214,11 @@ def test_a_lane_along_y_is_the_rotated_lane_along_x():
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.full)])
 @pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - {"paper_encounter"}))
 def test_the_robot_reaches_its_goal_without_hitting_anybody(name, seed):
-    scenario = ScenarioTemplate.shipped(name).for_seed(seed)
+    scenario = Scenario.shipped(name).draw(seed)
     deaf = "answers=0,startles=0"  # what people do by themselves counts
     result = run_crossing(scenario, policy="balanced", seed=seed, population=deaf)
     assert result.success
     assert result.contact_by != "robot"
     # What its people look at is what it says of them.
-    check = AttentionCheck.of(ScenarioTemplate.shipped(name), [result])
+    check = AttentionCheck.of(Scenario.shipped(name), [result])
     assert check.contradictions == ()

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from awarenav.cli import main
-from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
+from sim_tests import Scenario, SimError, run_crossing, shipped_scenarios
 from sim_tests.actors.behaviour import PersonSpec
 from sim_tests.crossing.sensors._camera import unusual_size_probability
 from sim_tests.scenario import SCENARIO_SETS
-from sim_tests.study.runs import named_templates
+from sim_tests.study.runs import named_scenarios
 from sim_tests.study.scenarios._validate import AttentionCheck
 
 NAMES = shipped_scenarios("guidelines")
@@ -21,14 +21,14 @@ def test_the_sets_share_no_scenario_and_all_stays_as_it_was_measured() -> None:
     assert SCENARIO_SETS == ("all", "guidelines", "step_out", "at_work")
     assert shipped_scenarios() == shipped_scenarios("all")
     assert not set(NAMES) & set(shipped_scenarios())
-    assert len(named_templates(["all"])) == 23
-    assert [each.name for each in named_templates(["guidelines"])] == list(NAMES)
-    assert len(named_templates(["all", "guidelines", NAMES[0]])) == 23 + len(NAMES)
+    assert len(named_scenarios(["all"])) == 23
+    assert [each.name for each in named_scenarios(["guidelines"])] == list(NAMES)
+    assert len(named_scenarios(["all", "guidelines", NAMES[0]])) == 23 + len(NAMES)
     sets = "'all', 'guidelines', 'step_out', 'at_work'"
     with pytest.raises(SimError, match=f"did you mean 'guidelines'. It must be one of {sets}"):
         shipped_scenarios("guideline")
     for name in NAMES:
-        assert ScenarioTemplate.shipped(f"{name}@1").name == Scenario.shipped(name).name == name
+        assert Scenario.shipped(f"{name}@1").name == Scenario.shipped(name).name == name
 
 
 def test_the_list_shows_all_sets(capsys: pytest.CaptureFixture[str]) -> None:
@@ -44,8 +44,8 @@ def test_the_list_shows_all_sets(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_child_is_drawn_in_its_size_and_the_robot_is_told_of_unusual_sizes() -> None:
-    template = ScenarioTemplate.shipped("child_visitor")
-    statures = [template.for_seed(seed).people[0].stature_m for seed in range(40)]
+    scenario = Scenario.shipped("child_visitor")
+    statures = [scenario.draw(seed).people[0].stature_m for seed in range(40)]
     assert 1.05 <= min(statures) < 1.1
     assert 1.25 < max(statures) <= 1.3
     for name in ("child_visitor", "kneels_at_work", "sits_at_work"):
@@ -75,8 +75,8 @@ def test_a_follower_keeps_the_distance_that_it_is_given() -> None:
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.full) for name in NAMES],
 )
 def test_the_robot_touches_no_one_and_people_look_as_the_label_says(name: str) -> None:
-    template = ScenarioTemplate.shipped(name)
-    result = run_crossing(template.for_seed(1), policy="balanced", seed=1)
+    scenario = Scenario.shipped(name)
+    result = run_crossing(scenario.draw(1), policy="balanced", seed=1)
     assert result.success
     assert result.contact_by != "robot"
-    assert AttentionCheck.of(template, [result]).contradictions == ()
+    assert AttentionCheck.of(scenario, [result]).contradictions == ()

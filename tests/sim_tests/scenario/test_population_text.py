@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from sim_tests import Scenario, ScenarioTemplate
+from sim_tests import Scenario
 from sim_tests.actors.behaviour import Hearing
 from sim_tests.world.errors import SimError
 
 
-def test_scenarios_and_templates_take_it_and_keep_the_rest() -> None:
+def test_scenarios_and_their_draws_take_it_and_keep_the_rest() -> None:
     text = "recorded,answers=0.8,startles=0.2"
-    for owner in (Scenario.shipped("late_glance"), ScenarioTemplate.shipped("late_glance")):
+    for owner in (Scenario.shipped("late_glance"), Scenario.shipped("late_glance").draw(1)):
         changed = owner.with_population(text)
-        scenario = changed if isinstance(changed, Scenario) else changed.median()
-        assert scenario.population == "recorded"
-        assert scenario.hearing == Hearing(answers=0.8, startles=0.2)
+        assert changed.population == "recorded"
+        assert changed.hearing == Hearing(answers=0.8, startles=0.2)
         again = changed.with_population("habituation=0.5")
-        scenario = again if isinstance(again, Scenario) else again.median()
-        assert scenario.population == "recorded"
-        assert scenario.hearing == Hearing(answers=0.8, startles=0.2, habituation=0.5)
+        assert again.population == "recorded"
+        assert again.hearing == Hearing(answers=0.8, startles=0.2, habituation=0.5)
 
 
 def test_numbers_alone_leave_people_as_they_are() -> None:
@@ -30,10 +28,9 @@ def test_numbers_alone_leave_people_as_they_are() -> None:
 
 
 def test_the_written_scenario_holds_them() -> None:
-    changed = ScenarioTemplate.shipped("late_glance").with_population("answers=0.3")
-    assert ScenarioTemplate.from_text(changed.to_text()).median().hearing.answers == 0.3
-    text = changed.median().to_text()
-    assert ScenarioTemplate.from_text(text).median().hearing.answers == 0.3
+    changed = Scenario.shipped("late_glance").with_population("answers=0.3")
+    assert Scenario.from_text(changed.to_text()).hearing.answers == 0.3
+    assert Scenario.from_text(changed.draw(2).to_text()).hearing.answers == 0.3
 
 
 @pytest.mark.parametrize(
@@ -52,6 +49,6 @@ def test_the_written_scenario_holds_them() -> None:
     ],
 )
 def test_another_text_is_refused(text: str, message: str) -> None:
-    for owner in (Scenario.shipped("late_glance"), ScenarioTemplate.shipped("late_glance")):
+    for owner in (Scenario.shipped("late_glance"), Scenario.shipped("late_glance").draw(1)):
         with pytest.raises(SimError, match=message):
             owner.with_population(text)

@@ -11,13 +11,12 @@ import pytest
 from paths import SHARED
 
 from awarenav.cli import main
-from sim_tests import CrossingResult, ScenarioTemplate, SimError, run_crossing
+from sim_tests import CrossingResult, Scenario, SimError, run_crossing
 from sim_tests.actors.behaviour import read_recordings
-from sim_tests.scenario.catalogue import template_problems
+from sim_tests.scenario.catalogue import drawn_problems
 from sim_tests.scenario.recordings import RecordingOptions, read_table, scenario_from_recording
 from sim_tests.study.report._write import recorded_people
 from sim_tests.study.runs import plan_jobs
-from sim_tests.study.social import EpisodeRecorder
 
 CLIPS = sorted((SHARED / "data").glob("citr_*.csv"))
 Place = Callable[[float], tuple[float, float]]
@@ -129,9 +128,9 @@ def test_the_task_is_the_robots_own_or_as_given_or_along_the_longer_side(tmp_pat
             tmp_path / f"{name}.yaml",
             RecordingOptions(**options),  # type: ignore[arg-type]
         )
-        scenario = ScenarioTemplate.from_yaml(made.scenario)
-        assert template_problems(scenario) == ()
-        of = scenario.median().robot
+        scenario = Scenario.from_yaml(made.scenario)
+        assert drawn_problems(scenario) == ()
+        of = scenario.robot
         return of.start_x_m, of.start_y_m, of.goal_x_m, of.goal_y_m
 
     assert task("own", robot_id="agv") == (0.0, 0.0, 8.0, 0.0)
@@ -183,7 +182,7 @@ def test_a_part_of_a_recording_begins_at_time_0_where_it_was_recorded(tmp_path: 
     for recording, place in zip(read_recordings(made.people), (across, along), strict=True):
         assert (recording.times_s[0], recording.times_s[-1]) == (0.0, 3.0)
         np.testing.assert_allclose(recording.positions_odom_m[0], place(2.0), atol=0.01)
-    hall = ScenarioTemplate.from_yaml(made.scenario).median().layout
+    hall = Scenario.from_yaml(made.scenario).layout
     places = np.vstack([each.positions_odom_m for each in read_recordings(made.people)])
     assert (places.min(axis=0) - [hall.x_min_m, hall.y_min_m] >= 3.0).all()
     assert ([hall.x_max_m, hall.y_max_m] - places.max(axis=0) >= 3.0).all()
@@ -200,7 +199,7 @@ def test_the_command_says_what_people_do_and_so_does_the_report(
     assert "would come within" in output
     assert f"awarenav crossings --scenario {tmp_path / 'fixed.yaml'}" in output
     assert main([*words, str(tmp_path / "reacts.yaml"), "--react", "--goal", "9", "-1"]) == 0
-    reacts = ScenarioTemplate.from_yaml(tmp_path / "reacts.yaml").median()
+    reacts = Scenario.from_yaml(tmp_path / "reacts.yaml")
     assert reacts.replay_reacts
     assert (reacts.robot.goal_x_m, reacts.robot.goal_y_m) == (9.0, -1.0)
     assert "until the robot forces them off" in reacts.description
@@ -216,11 +215,11 @@ def test_the_command_says_what_people_do_and_so_does_the_report(
     assert drawing.stat().st_size > 5000
     assert main(["scenario", "validate", *files]) == 0
     with pytest.raises(SimError, match="need recorded people"):
-        ScenarioTemplate({**kneeling(), "replay_reacts": True})
+        Scenario.from_data({**kneeling(), "replay_reacts": True})
 
 
 def kneeling() -> dict[str, object]:
-    return ScenarioTemplate.shipped("kneels_at_work").median().model_dump()
+    return Scenario.shipped("kneels_at_work").model_dump()
 
 
 def crossed(
@@ -228,13 +227,12 @@ def crossed(
     out: Path,
     options: RecordingOptions,
     duration_s: float | None = None,
-    observer: EpisodeRecorder | None = None,
 ) -> CrossingResult:
     made = scenario_from_recording(table, out, options)
-    scenario = ScenarioTemplate.from_yaml(made.scenario).median()
+    scenario = Scenario.from_yaml(made.scenario)
     if duration_s is not None:
         scenario = scenario.model_copy(update={"duration_s": duration_s})
-    return run_crossing(scenario, policy="balanced", observer=observer)
+    return run_crossing(scenario, policy="balanced")
 
 
 def off_path_m(result: CrossingResult, people: Path) -> np.ndarray:
@@ -276,12 +274,10 @@ def test_people_walk_into_a_robot_or_round_it(tmp_path: Path) -> None:
 def test_people_who_left_are_not_measured(tmp_path: Path) -> None:
     people: dict[str, Place] = {"agv": robot, "b": along}
     table = written(tmp_path / "leaves.csv", people)
-    recorder = EpisodeRecorder()
     options = RecordingOptions(robot_id="agv", until_s=101.0)
-    result = crossed(table, tmp_path / "leaves.yaml", options, 2.0, recorder)
-    episode = recorder.episode(result)
-    there = ~np.isnan(episode.people_m[:, 0]).any(axis=1)
-    np.testing.assert_array_equal(there, episode.t_s < 1.01)
+    result = crossed(table, tmp_path / "leaves.yaml", options, 2.0)
+    there = ~np.isnan(result.people_odom_m[:, 0]).any(axis=1)
+    np.testing.assert_array_equal(there, result.t_s < 1.01)
 
 
 @pytest.mark.skipif(

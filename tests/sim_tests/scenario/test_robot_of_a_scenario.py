@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, shipped_scenarios
-from sim_tests.scenario import scenario_for_robot
+from sim_tests import NOVA_CARTER, Scenario, shipped_scenarios
 from sim_tests.scenario.catalogue import closest_approaches, robot_plan, scenario_problems
 
 RACK = {"x_m": 2.0, "y_m": 0.0, "length_m": 1.0, "width_m": 1.0}
@@ -36,15 +35,13 @@ def test_a_long_robot_needs_more_room_at_its_start() -> None:
 @pytest.mark.parametrize("robot", ["forklift", "omni"])
 def test_every_fitted_scenario_passes_with_its_robot(robot: str) -> None:
     for name in shipped_scenarios():
-        fitted = scenario_for_robot(ScenarioTemplate.shipped(name).for_seed(0), robot)
+        fitted = Scenario.shipped(name).draw(0).with_robot(robot)
         assert scenario_problems(fitted) == (), name
 
 
 def test_the_plan_has_the_speed_of_the_robot() -> None:
-    before = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
-    slow = before.model_copy(
-        update={"robot_model": scenario_for_robot(before, "delivery").robot_model}
-    )
+    before = Scenario.shipped("crossing_from_left").draw(0)
+    slow = before.model_copy(update={"robot_model": before.with_robot("delivery").robot_model})
     assert slow.robot_profile.max_speed_mps == 1.0
     assert before.robot_profile is NOVA_CARTER
     t_s = np.array([0.0, 6.0])

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, SimError, shipped_scenarios
+from sim_tests import NOVA_CARTER, Scenario, SimError, shipped_scenarios
 from sim_tests.actors.robot import RobotModel, shipped_robots
-from sim_tests.scenario import SCENARIO_SETS, scenario_for_robot
+from sim_tests.scenario import SCENARIO_SETS
 from sim_tests.scenario.catalogue import CONFLICT_M, closest_approaches, person_plan
 
 FORKLIFT = RobotModel.shipped("forklift")
@@ -22,14 +22,14 @@ PLANNED = [each for each in SHIPPED if each.robot.straight_on_speed_mps is None]
 
 
 def test_the_shipped_robot_changes_nothing() -> None:
-    assert all(scenario_for_robot(each, "nova_carter") is each for each in SHIPPED)
+    assert all(each.with_robot("nova_carter") == each for each in SHIPPED)
 
 
 @pytest.mark.parametrize("name", ["forklift", "omni", "delivery"])
 @pytest.mark.parametrize("scenario", PLANNED, ids=lambda each: each.name)
 def test_every_scenario_has_room_and_time_for_every_robot(scenario: Scenario, name: str) -> None:
     model = RobotModel.shipped(name)
-    fitted = scenario_for_robot(scenario, model)
+    fitted = scenario.with_robot(model)
     assert fitted.name == f"{scenario.name}_{name}"
     task, profile = fitted.robot, model.profile
     # As much room beside the outline as the Nova Carter has, at least.
@@ -59,7 +59,7 @@ def _least_gap_m(scenario: Scenario, start: np.ndarray, goal: np.ndarray) -> flo
 
 def test_order_beside_the_aisle_stays_and_racks_keep_their_size() -> None:
     before = Scenario.shipped("standing_in_aisle")
-    after = scenario_for_robot(before, FORKLIFT)
+    after = before.with_robot(FORKLIFT)
     for old, new in zip(before.layout.racks, after.layout.racks, strict=True):
         assert new.x_m == old.x_m
         assert new.width_m == pytest.approx(old.width_m)
@@ -73,7 +73,7 @@ def test_a_task_along_y_is_widened_along_x() -> None:
     data = Scenario.shipped("crowd_of_eight").model_dump()
     data["robot"] |= {"goal_x_m": 0.0, "goal_y_m": 4.0, "start_heading_deg": 90.0}
     before = Scenario.model_validate(data)
-    after = scenario_for_robot(before, FORKLIFT)
+    after = before.with_robot(FORKLIFT)
     assert after.layout.x_max_m > before.layout.x_max_m
     assert [rack.y_m for rack in after.layout.racks] == [rack.y_m for rack in before.layout.racks]
 
@@ -95,7 +95,7 @@ def test_people_beside_a_line_at_any_angle_move_as_beside_one_along_an_axis(turn
         goal = place(12.0, 0.0)
         robot = {"goal_x_m": goal["x_m"], "goal_y_m": goal["y_m"]}
         data = {"name": "t", "duration_s": 20.0, "layout": hall, "robot": robot}
-        return scenario_for_robot(Scenario.model_validate({**data, "people": [person]}), FORKLIFT)
+        return Scenario.model_validate({**data, "people": [person]}).with_robot(FORKLIFT)
 
     usual, turned = task(turned=False), task(turned=True)
     assert turned.duration_s == pytest.approx(usual.duration_s)
@@ -111,9 +111,9 @@ def test_a_goal_beside_the_line_hardly_changes_the_fit(beside_m: float) -> None:
     """The aisle is as wide, racks keep their size, and nobody's route moves along the aisle."""
     data = Scenario.shipped("blind_corner").model_dump()
     data["robot"] |= {"lane_half_width_m": None}
-    straight = scenario_for_robot(Scenario.model_validate(data), FORKLIFT)
+    straight = Scenario.model_validate(data).with_robot(FORKLIFT)
     data["robot"] |= {"goal_y_m": data["robot"]["goal_y_m"] + beside_m}
-    beside = scenario_for_robot(Scenario.model_validate(data), FORKLIFT)
+    beside = Scenario.model_validate(data).with_robot(FORKLIFT)
     for name, value in straight.layout.model_dump().items():
         if isinstance(value, float):
             assert beside.layout.model_dump()[name] == pytest.approx(value, abs=0.1), name
@@ -124,30 +124,34 @@ def test_a_goal_beside_the_line_hardly_changes_the_fit(beside_m: float) -> None:
             assert (new.x_m, new.y_m) == pytest.approx((old.x_m, old.y_m), abs=0.15)
 
 
-def test_a_fitted_scenario_is_not_fitted_again() -> None:
-    fitted = scenario_for_robot(Scenario.shipped("blind_corner"), FORKLIFT)
-    assert scenario_for_robot(fitted, "forklift") is fitted
+def test_another_robot_fits_the_scenario_as_it_was_written() -> None:
+    written = Scenario.shipped("blind_corner")
+    fitted = written.with_robot(FORKLIFT)
+    assert fitted.with_robot("forklift") == fitted
+    assert fitted.with_robot("omni") == written.with_robot("omni")
+    # One that has its robot's room already keeps it.
+    own = fitted.model_copy()
+    assert own.with_robot("forklift") == own
     with pytest.raises(SimError, match="for the robot 'forklift' already, got 'omni'"):
-        scenario_for_robot(fitted, "omni")
+        own.with_robot("omni")
 
 
-def test_a_fitted_template_draws_fitted_scenarios_and_survives_text() -> None:
-    template = ScenarioTemplate.shipped("crossing_from_left")
-    fitted = template.with_robot("forklift")
+def test_a_fitted_scenario_draws_fitted_ones_and_survives_text() -> None:
+    scenario = Scenario.shipped("crossing_from_left")
+    fitted = scenario.with_robot("forklift")
     assert fitted.name == "crossing_from_left_forklift"
-    assert fitted.for_seed(3) == scenario_for_robot(template.for_seed(3), "forklift")
-    assert ScenarioTemplate.from_text(fitted.to_text()).for_seed(3) == fitted.for_seed(3)
-    assert template.with_robot("") is template
-    # A scenario as text keeps its robot, and one without a robot does not mention any.
-    scenario = fitted.median()
-    assert ScenarioTemplate.from_text(scenario.to_text()).median() == scenario
-    assert "robot_model" not in template.median().to_text()
+    assert fitted.draw(3) == scenario.draw(3).with_robot("forklift")
+    assert Scenario.from_text(fitted.to_text()).draw(3) == fitted.draw(3)
+    assert scenario.with_robot("") is scenario
+    # The text of fields keeps their robot, and without one does not mention any.
+    assert Scenario.from_text(fitted.model_copy().to_text()) == fitted.with_values({})
+    assert "robot_model" not in scenario.model_copy().to_text()
 
 
 def test_a_slow_robot_gets_more_time() -> None:
     slow = RobotModel.of(replace(NOVA_CARTER, max_speed_mps=0.5))
     before = Scenario.shipped("crossing_from_left")
-    after = scenario_for_robot(before, slow)
+    after = before.with_robot(slow)
     assert after.duration_s > 2.5 * before.duration_s
     # People wait for as long as the robot takes longer to the middle of its way.
     half_m = 0.5 * math.hypot(before.robot.goal_x_m, before.robot.goal_y_m)
@@ -183,8 +187,8 @@ def _with_person(**person: Any) -> Scenario:
 def test_people_stop_and_turn_where_they_did_beside_the_lane(
     name: str, seed: int, robot: str
 ) -> None:
-    before = ScenarioTemplate.shipped(name).for_seed(seed)
-    after = scenario_for_robot(before, robot)
+    before = Scenario.shipped(name).draw(seed)
+    after = before.with_robot(robot)
     stretch = after.layout.aisle_width_m / before.layout.aisle_width_m
     (old,), (new,) = _stops_and_turn(before), _stops_and_turn(after)
     assert new == pytest.approx([old[0], stretch * old[1]], abs=6e-3)
@@ -198,7 +202,7 @@ def test_stops_keep_their_place_beyond_a_corner_and_on_the_way_back() -> None:
         pauses=[{"at_m": at_m, "for_s": 2.0} for at_m in (2.0, 4.5, 8.0, 12.0)],
         turns_back_at_m=8.5,
     )
-    after = scenario_for_robot(before, FORKLIFT)
+    after = before.with_robot(FORKLIFT)
     places = [(8.0, -1.0), (6.0, -0.5), (6.0, 3.0), (6.0, 0.0), (6.0, 3.5)]
     assert np.array(_stops_and_turn(before)) == pytest.approx(np.array(places), abs=6e-3)
     inner_m, extra_m = (
@@ -217,7 +221,7 @@ def test_stops_keep_their_place_beyond_a_corner_and_on_the_way_back() -> None:
 def test_a_stop_after_the_end_of_a_route_stays_after_it() -> None:
     ends = [{"x_m": 7.0, "y_m": -3.0}, {"x_m": 7.0, "y_m": 3.0}]
     before = _with_person(route=ends, pauses=[{"at_m": 6.5, "for_s": 1.0}], turns_back_at_m=7.0)
-    (person,) = scenario_for_robot(before, FORKLIFT).people
+    (person,) = before.with_robot(FORKLIFT).people
     length_m = abs(person.route[1].y_m - person.route[0].y_m)
     assert length_m > 6.0
     assert person.pauses[0].at_m == pytest.approx(length_m + 0.5)
@@ -243,21 +247,21 @@ def test_people_come_as_near_to_another_robot_as_to_the_one_of_the_scenario(
     name: str, robot: str
 ) -> None:
     """Between surfaces: people are farther from the lane by what is wider."""
-    template = ScenarioTemplate.shipped(name)
-    fitted = template.with_robot(robot)
-    lanes_m = [each.median().layout.aisle_width_m for each in (template, fitted)]
-    lane_m = template.median().robot.lane_half_width_m
+    scenario = Scenario.shipped(name)
+    fitted = scenario.with_robot(robot)
+    lanes_m = [each.layout.aisle_width_m for each in (scenario, fitted)]
+    lane_m = scenario.robot.lane_half_width_m
     wider_m = 0.5 * (lanes_m[1] - lanes_m[0])
     if lane_m is not None:
-        wider_m = max(wider_m, fitted.median().robot.lane_half_width_m - lane_m)
-    before_m, after_m = (_nearest_m(each) for each in (template, fitted))
+        wider_m = max(wider_m, fitted.robot.lane_half_width_m - lane_m)
+    before_m, after_m = (_nearest_m(each) for each in (scenario, fitted))
     conflicts = float(np.mean(before_m < CONFLICT_M))
     assert np.mean(after_m < CONFLICT_M + wider_m) == pytest.approx(conflicts, abs=0.16)
     assert np.median(after_m) == pytest.approx(np.median(before_m), abs=wider_m + 0.35)
 
 
-def _nearest_m(template: ScenarioTemplate) -> np.ndarray:
+def _nearest_m(scenario: Scenario) -> np.ndarray:
     """Return how near somebody would come to the robot in each draw if nobody reacted."""
-    draws = range(DRAWS if template.parameters() else 1)
-    nearest = [min(closest_approaches(template.for_seed(seed)).values()) for seed in draws]
+    draws = range(DRAWS if scenario.distributions else 1)
+    nearest = [min(closest_approaches(scenario.draw(seed)).values()) for seed in draws]
     return np.array([distance_m for distance_m, _ in nearest])

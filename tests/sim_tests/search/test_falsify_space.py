@@ -12,7 +12,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_tests import ScenarioTemplate, SimError, run_crossing, shipped_scenarios
+from sim_tests import Scenario, SimError, run_crossing, shipped_scenarios
 from sim_tests.actors.behaviour import FASTEST_RECORDED_MPS, Hearing, Lapse, draw_person
 from sim_tests.actors.robot import NOVA_CARTER, RobotModel
 from sim_tests.crossing.planner import StraightOn
@@ -35,13 +35,11 @@ NAMES = (
     *("crossing_from_left", "runs_out", "blind_corner", "walking_backwards", "crowd_of_eight"),
     *("group_crossing", "head_on_in_aisle"),
 )
-SPACES = {
-    name: ScenarioSpace(ScenarioTemplate.shipped(name)) for name in (*NAMES, "paper_encounter")
-}
+SPACES = {name: ScenarioSpace(Scenario.shipped(name)) for name in (*NAMES, "paper_encounter")}
 
 
 def recorded(name: str) -> ScenarioSpace:
-    return ScenarioSpace(ScenarioTemplate.shipped(name).with_population("recorded"))
+    return ScenarioSpace(Scenario.shipped(name).with_population("recorded"))
 
 
 def somewhere(space: ScenarioSpace, seed: int) -> dict[str, float]:
@@ -68,7 +66,7 @@ def line(points) -> shapely.Geometry:
 @pytest.mark.parametrize("name", SPACES)
 def test_with_neutral_parameters_the_scenario_is_as_written(name):
     space = SPACES[name]
-    written = space.template.median().model_copy(update={"start_jitter_s": 0.0})
+    written = space.written.model_copy(update={"start_jitter_s": 0.0})
     assert space.scenario(space.neutral) == written
 
 
@@ -76,13 +74,13 @@ def test_with_neutral_parameters_the_scenario_is_as_written(name):
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 2**32))
 def test_people_keep_to_human_limits_and_what_is_added_is_in_nobodys_way(name, seed):
     space = SPACES[name]
-    median = space.template.median().model_copy(update={"start_jitter_s": 0.0})
+    median = space.written.model_copy(update={"start_jitter_s": 0.0})
     scenario = space.scenario(somewhere(space, seed))
     hall, task = scenario.layout, scenario.robot
     # At most one pallet is parked, and one companion added.
     props, people = median.layout.props, median.people
     assert hall.props[: len(props)] == props
-    if all(key.startswith("people.") for key in space.template.parameters()):
+    if all(key.startswith("people.") for key in space.written.distributions):
         assert hall.model_copy(update={"props": props}) == median.layout
         same = {"people": (), "layout": hall}
         assert scenario.model_copy(update=same) == median.model_copy(update=same)
@@ -115,7 +113,7 @@ def test_people_keep_to_human_limits_and_what_is_added_is_in_nobodys_way(name, s
 
 @pytest.mark.parametrize("name", ["crossing_distracted", "paper_encounter"])
 def test_only_who_notices_the_robot_can_forget_it(name):
-    unaware = ScenarioSpace(ScenarioTemplate.shipped(name)).parameters
+    unaware = ScenarioSpace(Scenario.shipped(name)).parameters
     assert "people.0.speed_mps" in unaware
     assert "people.0.lapse_after_s" not in unaware
     assert "people.0.lapse_after_s" in SPACES["crossing_from_left"].parameters
@@ -131,7 +129,7 @@ def test_a_lapse_has_the_searched_values():
 
 
 def test_somebody_who_stands_in_the_scenario_sets_off_at_a_lapse_alone():
-    space = ScenarioSpace(ScenarioTemplate.shipped("standing_in_aisle"))
+    space = ScenarioSpace(Scenario.shipped("standing_in_aisle"))
     levers = {"sets_off_x_m": -1.0, "sets_off_y_m": -1.5, "sets_off_mps": 1.8}
     written, person, still = (
         varied(space, "people.0.", **each).people[0]
@@ -180,8 +178,8 @@ def test_two_people_exchange_their_ways():
 @pytest.mark.parametrize("name", ["crossing_from_left", "crossing_distracted"])
 def test_how_people_answer_is_a_lever_where_the_robot_asks(name):
     """Neutral values change nothing; the others set one person's hearing alone."""
-    template = ScenarioTemplate.shipped(name)
-    space, silent = ScenarioSpace(template, asks=True), ScenarioSpace(template)
+    scenario = Scenario.shipped(name)
+    space, silent = ScenarioSpace(scenario, asks=True), ScenarioSpace(scenario)
     added = set(space.parameters) - set(silent.parameters)
     answers, delay, into = (
         f"people.0.{key}" for key in ("answers", "answer_delay_s", "startles_into_path")
@@ -193,19 +191,19 @@ def test_how_people_answer_is_a_lever_where_the_robot_asks(name):
         ({answers: 0.9, delay: 1.5}, {"answers": 1.0, "delay_median_s": 1.5, "delay_spread": 1.0}),
         ({into: 0.8}, {"startles": 1.0, "startles_into_path": 1.0}),
     ):
-        scenario = space.scenario({**space.neutral, **values})
-        first, *others = scenario.people
-        assert first.hearing == Hearing().with_numbers(changes)
+        asked = space.scenario({**space.neutral, **values})
+        first, *others = asked.people
+        assert first.hearing == Hearing().model_copy(update=changes)
         assert [each.hearing for each in others] == [None] * len(others)
-        assert scenario.hearing == Hearing()
-    other = ScenarioSpace(template.with_population("phone_factor=0.2"), asks=True)
+        assert asked.hearing == Hearing()
+    other = ScenarioSpace(scenario.with_population("phone_factor=0.2"), asks=True)
     (first, *_) = other.scenario({**other.neutral, into: 0.8}).people
     assert first.hearing.phone_factor == 0.2
 
 
 @pytest.mark.parametrize("name", shipped_scenarios("step_out"))
 def test_of_people_who_step_out_the_robots_distance_is_a_lever_in_place_of_the_clock(name):
-    space, moment = ScenarioSpace(ScenarioTemplate.shipped(name)), "people.0.sets_off_within_m"
+    space, moment = ScenarioSpace(Scenario.shipped(name)), "people.0.sets_off_within_m"
     assert "people.0.start_s" not in space.parameters
     assert "people.0.start_s" in SPACES["runs_out"].parameters
     assert space.parameters[moment].neutral == pytest.approx(1.2, abs=0.1)
@@ -222,7 +220,7 @@ def test_the_search_takes_people_who_step_out_unless_others_are_named():
 
 def test_a_search_begins_at_the_medians_of_recorded_people():
     space = recorded("crossing_from_left")
-    (written,), (person,) = space.template.median().people, varied(space).people
+    (written,), (person,) = space.written.people, varied(space).people
     drawn = [draw_person(written, np.random.default_rng(seed)) for seed in range(400)]
     speeds = np.array([each.speed_mps for each in drawn])
     assert np.ptp(speeds) > 0.5
@@ -241,7 +239,7 @@ def test_what_the_search_sets_is_not_drawn_again():
     assert (person.speed_mps, person.glances.glance_median_s) == (2.4, 2.0)
     assert person.glances.looker_share == 1.0
     assert space.ranges["people.0.speed_mps"].high == FASTEST_RECORDED_MPS
-    classic = ScenarioSpace(ScenarioTemplate.shipped("intersection")).ranges
+    classic = ScenarioSpace(Scenario.shipped("intersection")).ranges
     assert classic["people.0.speed_mps"].high == 2.0
     _, companion = varied(recorded("crossing_from_left"), companion__kind=0.5).people
     assert companion.as_written
@@ -269,7 +267,7 @@ def test_people_begin_farther_from_a_long_robot():
     )
     nearest = []
     for more in ({}, {"robot_model": "forklift"}):
-        space = ScenarioSpace(ScenarioTemplate({**data, **more}))
+        space = ScenarioSpace(Scenario.from_data({**data, **more}))
         people = [space.scenario(somewhere(space, seed)).people[0] for seed in range(25)]
         nearest.append(min(float(np.hypot(*path(person)[0])) for person in people))
     assert ROBOT_CLEARANCE_M <= nearest[0] < ROBOT_CLEARANCE_M + longer_m <= nearest[1] + 1e-9
@@ -277,7 +275,7 @@ def test_people_begin_farther_from_a_long_robot():
 
 def test_a_scenario_without_people_is_refused():
     with pytest.raises(SimError, match="no people to vary"):
-        ScenarioSpace(ScenarioTemplate.shipped("crossing_from_left"), 0)
+        ScenarioSpace(Scenario.shipped("crossing_from_left"), 0)
 
 
 def test_a_straight_path_is_shifted_to_its_left():

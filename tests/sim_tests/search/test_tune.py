@@ -14,7 +14,7 @@ from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
 from sim_tests.conditions import Experiment
 from sim_tests.crossing import named_policy
-from sim_tests.scenario import shipped_templates
+from sim_tests.scenario import Scenario, shipped_scenarios
 from sim_tests.search._settings import common_settings
 from sim_tests.search._study import Outcome, Trial
 from sim_tests.search.tune._evaluation import (
@@ -200,13 +200,13 @@ def test_the_estimate_from_few_episodes_uses_the_base_policy_on_the_same():
 
 
 def test_a_third_of_the_scenarios_is_held_out_of_every_kind_of_attention():
-    templates = shipped_templates()
-    held_out = held_out_scenarios(templates)
-    assert held_out == held_out_scenarios(templates[::-1])
-    assert abs(len(held_out) - len(templates) / 3) < 1
-    kinds = {each.attention for each in templates if each.name in held_out}
+    scenarios = [*map(Scenario.shipped, shipped_scenarios())]
+    held_out = held_out_scenarios(scenarios)
+    assert held_out == held_out_scenarios(scenarios[::-1])
+    assert abs(len(held_out) - len(scenarios) / 3) < 1
+    kinds = {each.attention for each in scenarios if each.name in held_out}
     assert kinds == {"attentive", "mixed", "unaware"}
-    assert held_out_scenarios(templates[:2]) == ()
+    assert held_out_scenarios(scenarios[:2]) == ()
 
 
 def tune_settings(**changes) -> TuneSettings:
@@ -226,7 +226,9 @@ def tune_settings(**changes) -> TuneSettings:
 def test_the_episodes_of_a_tuning_have_its_perception(name):
     balanced = AwarenessPolicy.preset("balanced")
     settings = tune_settings(perception=name)
-    jobs = settings.jobs("b", balanced, range(7, 9), shipped_templates()[:3])
+    jobs = settings.jobs(
+        "b", balanced, range(7, 9), [*map(Scenario.shipped, shipped_scenarios()[:3])]
+    )
     assert len(jobs) == 6
     assert {(job.perception, job.policy) for job in jobs} == {(name, "b")}
     assert sorted({job.seed for job in jobs}) == [7, 8]

@@ -13,7 +13,6 @@ from nav_adapter.rigid import Motion
 from sim_tests import NOVA_CARTER, CrossingFrame, CrossingResult
 from sim_tests.crossing._separations import AWAY, Approach, ContactEvent, margins_m, moves
 from sim_tests.crossing._stage import TrueView
-from sim_tests.study.measures._trace import Trace
 from tracking import PersonTrack
 
 BODY_RADIUS_M = 0.30
@@ -173,24 +172,3 @@ def straight(speed_mps, start=(0.0, 0.0), heading=0.0):
 def walking(start, velocity):
     """A person who walks straight on."""
     return lambda t: (start[0] + velocity[0] * t, start[1] + velocity[1] * t, *velocity)
-
-
-def trace(times, robot, people):
-    """The same as arrays, without separations and awareness: quick to make."""
-    poses = np.array([robot(t) for t in times])
-    walks = np.array([[person(t) for person in people] for t in times])
-    nothing = np.zeros((len(times), len(people)))
-    return Trace(
-        t_s=np.asarray(times, dtype=float),
-        robot_odom_m=poses[:, :2],
-        heading_odom_rad=poses[:, 2],
-        velocity_base_mps=np.column_stack((poses[:, 3], np.zeros(len(poses)))),
-        yaw_rate_radps=np.zeros(len(poses)),
-        people_odom_m=walks.reshape(len(times), len(people), 4)[..., :2],
-        people_odom_mps=walks.reshape(len(times), len(people), 4)[..., 2:],
-        awareness=nothing,
-        separation_m=nothing,
-        could_look=nothing > 0.0,
-        since_look_s=nothing + np.inf,
-        has_noticed=nothing > 0.0,
-    )

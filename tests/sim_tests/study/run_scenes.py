@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.study.runs import plan_jobs
 
 SHORT = """
@@ -20,9 +20,9 @@ people:
 """
 
 
-def short(name: str = "short") -> ScenarioTemplate:
+def short(name: str = "short") -> Scenario:
     """Return a scenario of a robot that drives 0.6 m, and a person who stands."""
-    return ScenarioTemplate.from_text(SHORT.format(name=name))
+    return Scenario.from_text(SHORT.format(name=name))
 
 
 def short_jobs(episodes: int = 2, **options):

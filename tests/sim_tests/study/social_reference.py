@@ -246,7 +246,7 @@ def reference_measures(episode, groups):
     """Return every measure of ``social.csv`` by its name, for an episode with people and a goal."""
     rows, walls = instants_of(episode), [tuple(map(float, w)) for w in episode.walls_m]
     goal = tuple(map(float, episode.goal_m))
-    radius, body, outcome = episode.robot_radius_m, episode.person_radius_m, episode.outcome
+    radius, body = episode.robot_radius_m, episode.person_radius_m
     duration, length = rows[-1]["t"] - rows[0]["t"], path_length(rows)
     surfaces, centres = surface_distances(rows, radius, body), centre_distances(rows)
     times, percents = zone_times(rows, surfaces), zone_percents(surfaces)
@@ -277,14 +277,14 @@ def reference_measures(episode, groups):
         )
     }
     return {
-        "spl": weighted(outcome.success, length, outcome.reference_length_m),
-        "stl": weighted(outcome.success, outcome.time_to_goal_s, outcome.reference_time_s),
+        "spl": weighted(episode.success, length, episode.reference_length_m),
+        "stl": weighted(episode.success, episode.time_to_goal_s, episode.reference_time_s),
         "path_irregularity_rad": excess,
         "path_irregularity_radpm": excess / length,
         "mean_goal_angle_rad": goal_angle(rows, goal),
         "time_to_collision_s": collision_time(rows, radius, body),
         **{f"{zone}_distance_s": times[zone] for zone in ("intimate", "personal", "social")},
-        "human_delay_s": outcome.human_delay_s,
+        "human_delay_s": episode.human_delay_s,
         "people_acceleration_mps2": people[0] / people[1],
         "people_jerk_mps3": people[2] / people[3],
         "people_heading_changes_rad": turned,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim_tests.study.social import Outcome, SocialEpisode
+from sim_tests.study.social import SocialEpisode
 
 WALLS_M = np.array([[-4.0, -4.0, 8.0, -4.0], [8.0, -4.0, 8.0, 4.0], [2.0, 1.5, 3.0, 2.5]])
 
@@ -40,7 +40,11 @@ def random_episode(seed, *, people=4, count=90, absent=True):
         goal_m=np.array([6.0, 1.0]),
         goal_tolerance_m=0.3,
         walls_m=WALLS_M,
-        outcome=Outcome(bool(seed % 3), 7.5, 5.0, 0.8 * 6.0, -0.25),
+        success=bool(seed % 3),
+        time_to_goal_s=7.5,
+        reference_time_s=5.0,
+        reference_length_m=0.8 * 6.0,
+        human_delay_s=-0.25,
         name=f"random {seed}",
     )
 

@@ -11,8 +11,8 @@ import pytest
 from measured_scenes import crossing
 
 from awarenav.cli import main
-from sim_tests import ScenarioTemplate, run_crossing, shipped_scenarios
-from sim_tests.study.measures import MeasuredAttention, Trace
+from sim_tests import Scenario, run_crossing, shipped_scenarios
+from sim_tests.study.measures import MeasuredAttention
 from sim_tests.study.scenarios._validate import AttentionCheck, check_attention
 
 T_S = np.arange(0.0, 10.05, 0.1)
@@ -44,7 +44,7 @@ def seen(result, could_look):
 def measured(people, looks, could_look=lambda t, person: True):
     walks = [person_at(x) for x in people]
     result = seen(crossing(T_S, still, walks, looks=looks), could_look)
-    return MeasuredAttention.of(Trace.of(result))
+    return MeasuredAttention.of(result)
 
 
 def test_only_the_time_counts_in_which_looking_matters():
@@ -72,7 +72,7 @@ def checked(label, looks):
         "people": [{"name": "worker", "route": [{"x_m": 3.0, "y_m": 0.0}]}],
     }
     result = crossing(T_S, still, [person_at(3.0)], looks=looks)
-    return AttentionCheck.of(ScenarioTemplate(data), [result])
+    return AttentionCheck.of(Scenario.from_data(data), [result])
 
 
 @pytest.mark.parametrize(
@@ -96,14 +96,14 @@ def test_labels_are_contradicted_by_what_people_do(label, share, contradicts):
 
 def test_a_person_can_look_at_a_robot_ahead_and_in_sight_only():
     """In the aisle until they have passed each other; round the corner not before the rack ends."""
-    scenario = ScenarioTemplate.shipped("head_on_in_aisle").for_seed(0)
+    scenario = Scenario.shipped("head_on_in_aisle").draw(0)
     frames = run_crossing(scenario, policy="balanced", perception="truth", seed=0).frames
     for frame in frames:
         view, ahead_m = frame.truth[0], frame.T_odom_camera[0, 3]
         distance_m = view.position_odom_m[0] - ahead_m
         if abs(distance_m) > 0.5:
             assert view.could_look == (distance_m > 0.0)
-    begun = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
+    begun = Scenario.shipped("crossing_from_left").draw(0)
     begun = begun.model_copy(update={"duration_s": 0.2})
     first = run_crossing(begun, policy="balanced", perception="truth", seed=0).frames[0].truth[0]
     assert not first.could_look
@@ -111,10 +111,10 @@ def test_a_person_can_look_at_a_robot_ahead_and_in_sight_only():
 
 
 def wrongly_labelled(folder: Path, name: str, label: str) -> Path:
-    template = ScenarioTemplate.shipped(name)
+    scenario = Scenario.shipped(name)
     path = folder / f"{name}.yaml"
-    text = template.to_text()
-    path.write_text(text.replace(f"attention: {template.attention}", f"attention: {label}"))
+    text = scenario.to_text()
+    path.write_text(text.replace(f"attention: {scenario.attention}", f"attention: {label}"))
     return path
 
 
@@ -135,6 +135,6 @@ def test_validate_names_a_wrong_label_with_what_was_measured(tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_people_of_shipped_scenarios_do_what_their_label_says(name):
-    check = check_attention(ScenarioTemplate.shipped(name), range(3))
+    check = check_attention(Scenario.shipped(name), range(3))
     assert check.contradictions == ()
     assert not any(math.isnan(each.aware_share) for each in check.people)

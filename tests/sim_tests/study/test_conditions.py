@@ -20,7 +20,7 @@ from sim_tests import run_crossing
 from sim_tests.actors.robot import RobotModel
 from sim_tests.conditions import AXES, OPTIONS, Conditions, Experiment, Perception
 from sim_tests.crossing import Setup
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.study.measures import RECORD_COLUMNS, EpisodeRecord, Variant, labels
 from sim_tests.study.runs import Job, about_run, experiment_jobs
 from sim_tests.world.errors import SimError
@@ -134,7 +134,7 @@ def test_the_api_and_a_job_have_the_same_conditions():
         "late_glance_omni, seed 4, policy blind, planner reference, perception truth, "
         "camera surround, robot omni, population recorded, fault misses_30"
     )
-    drawn = ScenarioTemplate.from_text(job.scenario_text).for_seed(4)
+    drawn = Scenario.from_text(job.scenario_text).draw(4)
     assert setup.scenario == drawn
     assert setup.scenario.population == "recorded"
     assert setup.scenario.robot_model == RobotModel.shipped("omni")
@@ -142,10 +142,10 @@ def test_the_api_and_a_job_have_the_same_conditions():
 
 
 def test_a_drawn_scenario_is_changed_as_its_template_is():
-    template = ScenarioTemplate.shipped("blind_corner")
+    scenario = Scenario.shipped("blind_corner")
     changes = {"robot": RobotModel.shipped("forklift"), "population": "answers=0.9"}
-    first = Setup.of(template.for_seed(2), policy="blind", seed=2, **changes)
-    second = Setup.of(template, policy="blind", seed=2, **changes)
+    first = Setup.of(scenario.draw(2), policy="blind", seed=2, **changes)
+    second = Setup.of(scenario, policy="blind", seed=2, **changes)
     assert first.scenario == second.scenario
     assert first.conditions.robot == "forklift"
 
@@ -191,13 +191,12 @@ module.__package__ = "sim_tests"
 sys.modules["sim_tests.conditions"] = sim_tests.conditions = module
 exec(compile(source, str(path), "exec"), module.__dict__)
 
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 
-def with_lasts(template, text):
-    data = {**template._data, "duration_s": float(text)}
-    return ScenarioTemplate(data, template._source)
+def with_lasts(scenario, text):
+    return scenario._with(text, duration_s=float(text))
 
-ScenarioTemplate.with_lasts = with_lasts
+Scenario.with_lasts = with_lasts
 
 from awarenav.cli import main
 from sim_tests import run_crossing
@@ -242,5 +241,5 @@ def test_several_populations_are_compared_on_the_same_scenarios_and_seeds():
         (name, seed) for name in asked[:2] for seed in (0, 1)
     ]
     for job in jobs:
-        drawn = ScenarioTemplate.from_text(job.scenario_text).for_seed(job.seed)
+        drawn = Scenario.from_text(job.scenario_text).draw(job.seed)
         assert drawn.population == job.population

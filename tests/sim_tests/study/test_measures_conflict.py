@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, straight, trace, walking
+from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, crossing, straight, walking
 from shapely.geometry import Point, Polygon
 from shapely.ops import nearest_points
 
@@ -20,11 +20,11 @@ speeds = st.floats(-2.0, 2.0)
 
 
 def ttc(robot, *people, times=(0.0,)):
-    return min_time_to_collision_s(trace(times, robot, people), CARTER)
+    return min_time_to_collision_s(crossing(times, robot, people))
 
 
 def pet(robot, *people, times=HALL_S):
-    return post_encroachment_s(trace(times, robot, people), CARTER)
+    return post_encroachment_s(crossing(times, robot, people))
 
 
 @given(st.floats(1.0, 8.0), st.floats(0.1, 1.5), st.floats(0.0, 2.0), st.floats(-math.pi, math.pi))

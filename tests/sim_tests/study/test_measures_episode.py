@@ -30,14 +30,17 @@ def test_zones_are_timed_by_the_surfaces():
     assert record.min_time_to_collision_s == pytest.approx(0.05 / 0.5, abs=1e-6)
 
 
+EMPTY = {"time_without_people_s": 6.5, "length_without_people_m": 7.6}
+
+
 def test_way_and_time_against_the_same_task_without_people():
-    result = crossing(T_S, straight(1.0), time_to_goal_s=8.0)
-    record = measure(result, time_without_people_s=6.5, length_without_people_m=7.6)
+    result = crossing(T_S, straight(1.0), time_to_goal_s=8.0, **EMPTY)
+    record = measure(result)
     assert record.path_length_m == pytest.approx(8.0)
     assert record.spl == pytest.approx(7.6 / 8.0)
     assert record.time_lost_s == pytest.approx(1.5)
     assert record.min_separation_m is record.min_margin_m is record.post_encroachment_s is None
-    unknown = measure(result)
+    unknown = measure(crossing(T_S, straight(1.0), time_to_goal_s=8.0))
     assert unknown.time_lost_s is unknown.spl is None
 
 
@@ -48,11 +51,7 @@ def test_a_printed_result_has_its_main_figures():
 
 
 def test_not_reaching_the_goal_loses_all_of_the_time():
-    record = measure(
-        crossing(T_S, straight(1.0), reached=False),
-        time_without_people_s=6.5,
-        length_without_people_m=7.6,
-    )
+    record = measure(crossing(T_S, straight(1.0), reached=False, **EMPTY))
     assert (record.time_lost_s, record.spl, record.time_to_goal_s) == (8.0, 0.0, None)
 
 
@@ -250,7 +249,7 @@ def seen(t, person):
 @settings(max_examples=10)
 @given(st.floats(-math.pi, math.pi), st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
 def test_the_row_does_not_depend_on_the_odom_frame(angle, x, y):
-    record = measure(crossing(T_S, curve, PEOPLE, tracked=seen), time_without_people_s=5.0)
+    record = measure(crossing(T_S, curve, PEOPLE, tracked=seen, time_without_people_s=5.0))
     robot = turned(curve, angle, (x, y))
     people = [turned(person, angle, (x, y)) for person in PEOPLE]
     other = measure(
@@ -259,8 +258,8 @@ def test_the_row_does_not_depend_on_the_odom_frame(angle, x, y):
             lambda t: robot(t, True),
             [lambda t, person=person: person(t, False) for person in people],
             tracked=seen,
-        ),
-        time_without_people_s=5.0,
+            time_without_people_s=5.0,
+        )
     )
     for name in record.__dataclass_fields__:
         mine, yours = getattr(record, name), getattr(other, name)
@@ -284,8 +283,9 @@ def test_the_row_does_not_depend_on_the_order_of_people_and_tracks():
 
 
 def test_a_real_crossing_says_in_frames_what_the_meter_said():
-    result = run_crossing("crossing_attentive", policy="balanced", perception="truth", seed=2)
-    record = measure(result, time_without_people_s=10.0, length_without_people_m=12.8)
+    crossed = run_crossing("crossing_attentive", policy="balanced", perception="truth", seed=2)
+    result = replace(crossed, time_without_people_s=10.0, length_without_people_m=12.8)
+    record = measure(result)
     assert record.min_separation_m == pytest.approx(result.min_separation_m, abs=1e-6)
     nearest = min(result.frames, key=lambda frame: frame.separations_m[0])
     speed = nearest.approaches[0].robot_speed_mps

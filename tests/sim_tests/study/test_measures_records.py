@@ -124,12 +124,12 @@ def test_a_write_that_fails_leaves_the_old_table(tmp_path):
 
 #: One function more in the registry; what follows reads it.
 ONE_MORE = """
-from sim_tests.study.measures import _metrics
+from sim_tests.study.measures import _metrics, path_length_m
 
 @_metrics.measure_of_log("Half of the path", better="higher", decimals=1)
 def half_path_m(log) -> "float":
     '''Half of the length that the robot drove.'''
-    return 0.5 * log.path_length_m
+    return 0.5 * path_length_m(log.robot_odom_m)
 
 from measured_scenes import crossing, straight
 from sim_tests.study.measures import *

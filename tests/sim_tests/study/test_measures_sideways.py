@@ -105,10 +105,9 @@ def test_no_measure_depends_on_the_way_in_which_a_square_robot_faces():
     people = [walking((3.0, -3.0), (0.1, 0.9)), walking((5.0, 1.0), (-0.6, -0.1))]
 
     def measured(heading):
-        result = crossing(
-            T_S, drifting(braking, 0.3, heading), people, footprint_m=square_m, robot=robot
-        )
-        return measure(result, time_without_people_s=5.0), Conduct.of(result)
+        like = {"footprint_m": square_m, "robot": robot, "time_without_people_s": 5.0}
+        result = crossing(T_S, drifting(braking, 0.3, heading), people, **like)
+        return measure(result), Conduct.of(result)
 
     (facing, obeys), (aside, obeys_aside) = measured(0.3), measured(0.3 - 0.5 * math.pi)
     assert obeys.limit_excess_mps == pytest.approx(obeys_aside.limit_excess_mps, abs=1e-9)

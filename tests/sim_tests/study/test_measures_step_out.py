@@ -11,7 +11,7 @@ from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, crossing, straight
 
 from nav_adapter import RobotProfile
 from sim_tests import NOVA_CARTER
-from sim_tests.study.measures import Trace, measure
+from sim_tests.study.measures import measure
 from sim_tests.study.measures._step_out import FASTER_STEP_OUT, STEP_OUT, StepOut, step_out_impacts
 
 T_S = np.arange(0.0, 6.001, 0.05)
@@ -230,7 +230,7 @@ def test_everybody_is_in_one_group_and_the_groups_add_up(first, second, faces):
         awareness=lambda t, i: 0.9 * faces,
         looks=lambda t, i: any(start <= t <= start + lasts for start, lasts in both[i]),
     )
-    groups = Trace.of(result).noticed
+    groups = result.noticed
     assert (np.sum(list(groups.values()), axis=0) == 1).all()
     found = step_out_impacts(result)
     parts = [found[name] for name in groups]

@@ -60,8 +60,10 @@ def row(robot, walks, world=(0.0, 0.0, 0.0, False), away=0):
         looks=lambda t, person: 0.5 * person < t % 2.0 < 1.0,
         tracked=lambda t, person: (0.6, 0.5),
         contacts=contacts,
+        time_without_people_s=2.5,
+        length_without_people_m=2.0,
     )
-    return measure(result, time_without_people_s=2.5, length_without_people_m=2.0)
+    return measure(result)
 
 
 @settings(max_examples=25, deadline=None)

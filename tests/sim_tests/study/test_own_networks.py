@@ -13,8 +13,8 @@ from genuine_detectors import MODELS
 from awarenav.cli import main
 from perception.shipped import DETECTOR, HEAD, shipped_model_path
 from sim_tests import SimError, run_crossing
-from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.runs import attempt, plan_jobs, run_jobs, template_of
+from sim_tests.scenario import Scenario
+from sim_tests.study.runs import attempt, plan_jobs, run_jobs, scenario_of
 
 LOOKED_AT = """
 name: looked_at
@@ -29,7 +29,7 @@ people:
     heading_deg: 180.0
     gaze: [{t_s: 0.0, look: robot}]
 """
-SCENE = ScenarioTemplate.from_text(LOOKED_AT)
+SCENE = Scenario.from_text(LOOKED_AT)
 #: The shipped networks by name, so that they are loaded as networks of one's own are.
 BY_NAME = "{detector: shipped, pose: shipped, head: network, eyes: none}"
 
@@ -84,7 +84,7 @@ def test_the_contents_of_the_networks_are_part_of_the_episode(
     monkeypatch.chdir(tmp_path)
     own.write_text("head: head.onnx")
     (job,) = jobs_of("own.yaml")
-    networks = template_of(job.scenario_text).median().networks
+    networks = scenario_of(job.scenario_text).networks
     assert networks["head"] == str(tmp_path / "head.onnx")
     assert list(networks["sha256"]) == ["head"]
     assert jobs_of("own.yaml") == (job,)
@@ -92,7 +92,7 @@ def test_the_contents_of_the_networks_are_part_of_the_episode(
     own.write_text("{head: ./head.onnx, detector: 'ultralytics:detector.onnx'}")
     (other,) = jobs_of("own.yaml")
     assert other.networks == job.networks
-    both = template_of(other.scenario_text).median().networks
+    both = scenario_of(other.scenario_text).networks
     assert both["head"] == networks["head"]
     assert both["detector"] == f"ultralytics:{tmp_path / 'detector.onnx'}"
     assert other != job

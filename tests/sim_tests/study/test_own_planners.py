@@ -23,25 +23,25 @@ from sim_tests.study.runs import plan_jobs
     ],
 )
 def test_a_planner_is_called_with_what_its_signature_asks_for(name, given):
-    assert make_planner(f"run_planners:{name}", short().median(), seed=7).given == given
+    assert make_planner(f"run_planners:{name}", short(), seed=7).given == given
 
 
 def test_a_planner_that_is_made_already_is_copied_for_each_episode():
-    made = make_planner("run_planners:READY", short().median())
+    made = make_planner("run_planners:READY", short())
     assert made is not READY
     assert made.speed_mps == 0.5
-    assert make_planner("straight_on", short().median()).plan
+    assert make_planner("straight_on", short()).plan
 
 
 def test_a_planner_may_ask_for_seed_boxes_and_robot_in_any_order():
-    scenario = short().median()
+    scenario = short()
     seed, boxes, robot, options = make_planner("run_planners:Everything", scenario, seed=7).given
     assert (seed, robot, options) == (7, NOVA_CARTER, {})
     np.testing.assert_array_equal(boxes, scenario.planner_boxes_odom_m)
 
 
 def test_a_planner_may_ask_for_a_path_to_follow():
-    scenario = short().median()
+    scenario = short()
     task = scenario.robot
     (path,) = make_planner("run_planners:Follows", scenario).given
     np.testing.assert_array_equal(path, task.path_odom_m)

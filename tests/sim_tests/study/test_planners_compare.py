@@ -11,14 +11,14 @@ from page_reader import PageReader
 
 from awarenav.cli import main
 from sim_tests.conditions import Experiment
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.study.measures import Conduct
 from sim_tests.study.report import compare_planners
 from sim_tests.study.report._compare import plan_comparison
 from sim_tests.study.report._results import Results, Run
 from sim_tests.study.report._write import planners_section
 from sim_tests.study.report.command import command_line
-from sim_tests.study.runs import policy_of, read_attempts, read_jobs, template_of
+from sim_tests.study.runs import policy_of, read_attempts, read_jobs, scenario_of
 
 SCENE = """
 name: beside
@@ -37,7 +37,7 @@ NAMES = ["straight_on", "costmap", "run_planners:Raises", "run_planners:ReturnsN
 
 
 def scene():
-    return ScenarioTemplate.from_text(SCENE)
+    return Scenario.from_text(SCENE)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +159,7 @@ def test_the_probe_of_radii_changes_radii_alone():
 def test_robot_and_population_are_those_of_every_episode_and_of_the_command():
     jobs, _ = plan_comparison(
         ["straight_on"],
-        ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
+        ["late_glance", Scenario.shipped("crossing_attentive")],
         ["balanced"],
         (0,),
         robot="delivery",
@@ -167,7 +167,7 @@ def test_robot_and_population_are_those_of_every_episode_and_of_the_command():
     )
     names = {job.scenario for job in jobs}
     assert names == {"late_glance_delivery", "crossing_attentive_delivery"}
-    assert {template_of(job.scenario_text).for_seed(0).population for job in jobs} == {"recorded"}
+    assert {scenario_of(job.scenario_text).draw(0).population for job in jobs} == {"recorded"}
     values = {"scenario": ("runs_out",), "policy": ("blind",), "perception": "truth"}
     values |= {"sensors": "camera+scanner", "camera": "", "robot": "omni", "population": "recorded"}
     experiment = Experiment.taken_from(values)

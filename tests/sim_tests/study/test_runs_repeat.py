@@ -12,7 +12,7 @@ from run_scenes import SHORT, short_jobs
 
 from sim_tests import CrossingFrame, run_crossing
 from sim_tests.conditions import Perception
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.study.measures import read_records, summarise, summary_text
 from sim_tests.study.runs import (
     attempt,
@@ -142,12 +142,12 @@ def signature(frame: CrossingFrame) -> tuple[Any, ...]:
 )
 def test_the_api_a_run_a_replay_and_gymnasium_give_the_same_frames(text, perception, tmp_path):
     gymnasium = pytest.importorskip("gymnasium", reason="needs the extra awarenav[gym]")
-    template = ScenarioTemplate.from_text(text)
+    scenario = Scenario.from_text(text)
     oracle = perception == "oracle"
     senses = Perception.named("keypoints" if oracle else perception)
     kind, sensors = senses.kind or "keypoints", senses.sensors
     jobs = plan_jobs(
-        [template],
+        [scenario],
         ["oracle" if oracle else "balanced"],
         [3],
         perception=kind,
@@ -155,7 +155,7 @@ def test_the_api_a_run_a_replay_and_gymnasium_give_the_same_frames(text, percept
         faults=["bursts"],
     )
     by_the_api = run_crossing(
-        template, policy="balanced", perception=perception, seed=3, fault="bursts"
+        scenario, policy="balanced", perception=perception, seed=3, fault="bursts"
     )
     expected = [signature(each) for each in by_the_api.frames]
     assert sum(len(each.tracks) for each in by_the_api.frames) > 5
@@ -168,7 +168,7 @@ def test_the_api_a_run_a_replay_and_gymnasium_give_the_same_frames(text, percept
     assert [signature(each) for each in replayed.frames] == expected
     env = gymnasium.make(
         "sim_tests.learning:awarenav/Crossing-v0",
-        scenarios=template,
+        scenarios=scenario,
         policy="balanced",
         perception=perception,
         fault="bursts",

@@ -30,7 +30,7 @@ def test_a_trajectory_has_the_fields_of_the_published_layout(tmp_path):
     document = json.loads(path.read_text("utf-8"))
     assert {"metadata", "grid", "walls", "sequence"} < set(document)
     assert document["walls"] == episode.walls_m.tolist()
-    assert document["awarenav"]["time_to_goal_s"] == episode.outcome.time_to_goal_s
+    assert document["awarenav"]["time_to_goal_s"] == episode.time_to_goal_s
     frames = document["sequence"]
     assert [frame["timestamp"] for frame in frames] == episode.t_s.tolist()
     for row, frame in enumerate(frames):

@@ -10,7 +10,7 @@ from social_reference import reference_measures
 from social_scenes import random_episode, straight_episode
 
 from sim_tests import SimError
-from sim_tests.study.social import SOCIAL_MEASURES, Outcome, social_measures
+from sim_tests.study.social import SOCIAL_MEASURES, social_measures
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -62,8 +62,9 @@ def test_without_people_their_measures_do_not_apply():
 @settings(max_examples=25)
 @given(st.booleans(), st.floats(1.0, 50.0), st.floats(1.0, 50.0), st.floats(1.0, 50.0))
 def test_spl_and_stl_are_shares_that_only_the_reference_reaches(success, length, best, time):
-    outcome = Outcome(success, time, best, best)
-    episode = straight_episode([0.0, 1.0], length, outcome=outcome)
+    figures = {"success": success, "time_to_goal_s": time}
+    best_figures = {"reference_time_s": best, "reference_length_m": best}
+    episode = straight_episode([0.0, 1.0], length, **figures, **best_figures)
     measured = social_measures(episode)
     for name, actual in (("spl", length), ("stl", time)):
         assert 0.0 <= measured[name] <= 1.0

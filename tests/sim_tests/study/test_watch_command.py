@@ -21,7 +21,7 @@ from awarenav.cli import main
 from sim_tests.actors.robot import RobotModel
 from sim_tests.conditions import Experiment
 from sim_tests.study._commands import _job
-from sim_tests.study.runs import plan_jobs, template_of
+from sim_tests.study.runs import plan_jobs, scenario_of
 
 #: Three seconds of a robot on its way, with control at 20 Hz.
 WATCHED = (
@@ -113,7 +113,7 @@ def test_a_crossing_is_watched_with_another_robot_and_population() -> None:
     others = Experiment.taken_from({**values, "robot": "omni", "population": "recorded"})
     job = _job(others)
     assert (job.robot, job.population, job.camera) == ("omni", "recorded", "")
-    scenario = template_of(job.scenario_text).for_seed(3)
+    scenario = scenario_of(job.scenario_text).draw(3)
     assert scenario.robot_model == RobotModel.shipped("omni")
     assert scenario.population == "recorded"
     (own,) = plan_jobs(["late_glance"], ["blind"], [3], perception="truth")

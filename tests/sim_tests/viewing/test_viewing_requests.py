@@ -12,7 +12,7 @@ from viewed_crossing import CONDITIONS, SHORT
 from nav_adapter import Alert
 from nav_adapter.alerts import Answer
 from sim_tests.crossing import CrossingFrame, RequestMemory, Stage, TopView, run_crossing
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.viewing import CrossingRecorder, write_page
 
 ASKED_S, LOOKED_S = 0.5, 1.2
@@ -48,8 +48,8 @@ def run(*observers, control_hz: float = 20.0, duration_s: float = 3.6) -> None:
         for each in observers:
             each(asking(frame, 1.0 / control_hz), stage)
 
-    scenario = ScenarioTemplate.from_text(text)
-    run_crossing(scenario.for_seed(0), policy="balanced", perception="truth", observer=observe)
+    scenario = Scenario.from_text(text)
+    run_crossing(scenario.draw(0), policy="balanced", perception="truth", observer=observe)
 
 
 @dataclass

@@ -13,7 +13,7 @@ import pytest
 from viewed_crossing import SHORT, record
 
 from sim_tests.crossing import draw_camera_view, run_crossing
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.viewing import CameraPictures, outcome_text, page_text, state_of, write_page
 from sim_tests.world.errors import SimError
 
@@ -88,7 +88,7 @@ def test_boxes_are_drawn_where_the_person_is():
                 picture, camera, with_boxes(frame, box), stage, box_scale=scale, captions=False
             )
 
-    scenario = ScenarioTemplate.from_text(SHORT).for_seed(0)
+    scenario = Scenario.from_text(SHORT).draw(0)
     run_crossing(scenario, policy="balanced", perception="keypoints", observer=observe)
     assert np.array_equal(drawn["own"], drawn["of smaller images"])
     assert np.array_equal(drawn["of another view"], drawn["none"])
@@ -128,7 +128,7 @@ def test_rendering_takes_no_more_than_its_share_of_the_time(monkeypatch):
         monkeypatch.setattr(stage.warehouse.visuals, "draw", render)
         now[0] += 0.1
 
-    scenario = ScenarioTemplate.from_text(SHORT).for_seed(0)
+    scenario = Scenario.from_text(SHORT).draw(0)
     run_crossing(scenario, policy="blind", perception="truth", observer=observe)
     # A picture takes 0.3 s, so the next one begins 1.2 s after the beginning of the last.
     first, second = [index for index, each in enumerate(taken) if each][:2]
@@ -137,7 +137,7 @@ def test_rendering_takes_no_more_than_its_share_of_the_time(monkeypatch):
 
 def test_scans_are_thinned_to_cells_within_the_plan(recorded):
     recorder, _, frames = recorded
-    stage_like = type("StageLike", (), {"scenario": ScenarioTemplate.from_text(SHORT).for_seed(0)})
+    stage_like = type("StageLike", (), {"scenario": Scenario.from_text(SHORT).draw(0)})
     points = np.array([[1.0, 1.0], [1.004, 1.001], [2.0, -1.0], [90.0, 0.0]])
     state = state_of(frames[0], stage_like, points)
     assert state["scan_odom_cm"] == [100, 100, 200, -100]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim_tests.conditions import Conditions
 from sim_tests.crossing import CrossingFrame, CrossingResult, Stage, run_crossing
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.scenario import Scenario
 from sim_tests.viewing import CameraPictures, CrossingRecorder
 
 SHORT = """
@@ -36,6 +36,6 @@ def record(
         frames.append(frame)
         recorder(frame, stage)
 
-    scenario = ScenarioTemplate.from_text(text).for_seed(0)
+    scenario = Scenario.from_text(text).draw(0)
     result = run_crossing(scenario, policy="balanced", perception=perception, observer=observe)
     return recorder, result, frames

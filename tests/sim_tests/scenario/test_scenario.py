@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
+from sim_tests import Scenario, SimError, run_crossing, shipped_scenarios
 from sim_tests.scenario import read_distribution
 
 BASE = {
@@ -32,10 +32,10 @@ limits = st.tuples(st.floats(-50.0, 50.0), st.floats(0.1, 20.0)).map(
 )
 
 
-def template(**changes):
+def varied(**changes):
     data = copy.deepcopy(BASE)
     data["people"][0].update(changes)
-    return ScenarioTemplate(data)
+    return Scenario.from_data(data)
 
 
 @given(limits, shares, shares)
@@ -75,22 +75,23 @@ def test_draws_follow_the_named_distribution():
 
 
 def test_parameters_lists_the_distributions_by_path():
-    paths = template().parameters()
+    paths = varied().distributions
     assert list(paths) == ["people.0.route.0.y_m", "people.0.speed_mps", "people.0.start_s"]
     assert paths["people.0.start_s"].bounds == (0.0, 2.0)
 
 
-def test_the_same_generator_draws_the_same_scenario():
-    first, again = (template().sample(np.random.default_rng(3)) for _ in range(2))
-    assert first == again == template().for_seed(3)
-    assert first != template().for_seed(4)
+def test_the_same_seed_draws_the_same_scenario():
+    first = varied().draw(3)
+    assert first == varied().draw(3)
+    assert first != varied().draw(4)
+    assert first.draw(4) is first
 
 
 def test_adding_or_reordering_parameters_changes_no_other_draw():
-    plain = template().for_seed(7).people[0]
-    fewer = template(start_s=1.0).for_seed(7).people[0]
+    plain = varied().draw(7).people[0]
+    fewer = varied(start_s=1.0).draw(7).people[0]
     assert (fewer.speed_mps, fewer.route) == (plain.speed_mps, plain.route)
-    more = template(stature_m={"uniform": {"low": 1.6, "high": 1.9}}).for_seed(7).people[0]
+    more = varied(stature_m={"uniform": {"low": 1.6, "high": 1.9}}).draw(7).people[0]
     assert (more.speed_mps, more.start_s, more.route) == (
         plain.speed_mps,
         plain.start_s,
@@ -98,14 +99,14 @@ def test_adding_or_reordering_parameters_changes_no_other_draw():
     )
     data = copy.deepcopy(BASE)
     data["people"][0] = dict(reversed(data["people"][0].items()))
-    assert ScenarioTemplate(data).for_seed(7).people[0] == plain
+    assert Scenario.from_data(data).draw(7).people[0] == plain
 
 
 def test_draws_of_many_seeds_are_uniform_and_uncorrelated():
     drawn = np.array(
         [
             (person.start_s / 2.0, person.route[0].y_m - 5.0)
-            for person in (template().for_seed(seed).people[0] for seed in range(400))
+            for person in (varied().draw(seed).people[0] for seed in range(400))
         ]
     )
     for column in drawn.T:
@@ -114,28 +115,28 @@ def test_draws_of_many_seeds_are_uniform_and_uncorrelated():
 
 
 def test_given_values_replace_draws_and_the_others_are_medians():
-    person = template().with_values({"people.0.speed_mps": 1.0}).people[0]
+    person = varied().with_values({"people.0.speed_mps": 1.0}).people[0]
     assert person.speed_mps == 1.0
     assert person.start_s == 1.0
     assert person.route[0].y_m == 5.5
     with pytest.raises(SimError, match=r"did you mean 'people\.0\.speed_mps'"):
-        template().with_values({"people.0.speed": 1.0})
+        varied().with_values({"people.0.speed": 1.0})
     with pytest.raises(SimError, match=r"people\.0\.speed_mps.*greater than 0"):
-        template().with_values({"people.0.speed_mps": -1.0})
+        varied().with_values({"people.0.speed_mps": -1.0})
     with pytest.raises(SimError, match="finite"):
-        template().with_values({"people.0.start_s": float("nan")})
+        varied().with_values({"people.0.start_s": float("nan")})
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
-def test_shipped_templates_round_trip_through_text_and_pickle(name):
-    shipped = ScenarioTemplate.shipped(name)
+def test_shipped_scenarios_round_trip_through_text_and_pickle(name):
+    shipped = Scenario.shipped(name)
     assert shipped.name == name
-    assert ScenarioTemplate.from_text(shipped.to_text()) == shipped
+    assert Scenario.from_text(shipped.to_text()) == shipped
     assert pickle.loads(pickle.dumps(shipped)) == shipped
-    drawn = shipped.for_seed(5)
-    again = ScenarioTemplate.from_text(drawn.to_text())
-    assert again.parameters() == {}
-    assert again.for_seed(99) == drawn
+    drawn = shipped.draw(5)
+    again = Scenario.from_text(drawn.to_text())
+    assert not again.distributions
+    assert again.draw(99) == drawn
 
 
 def test_a_file_extends_shared_defaults_and_finds_its_recording_in_its_folder(tmp_path):
@@ -143,7 +144,7 @@ def test_a_file_extends_shared_defaults_and_finds_its_recording_in_its_folder(tm
     path.write_text(
         "name: mine\nextends: crossing_hall\nreplay_csv: people.csv\nrobot: {start_x_m: -1.0}\n"
     )
-    mine = ScenarioTemplate.from_yaml(path).median()
+    mine = Scenario.from_yaml(path)
     hall = Scenario.shipped("crossing_attentive")
     assert (mine.layout, mine.camera) == (hall.layout, hall.camera)
     assert (mine.robot.start_x_m, mine.robot.goal_x_m) == (-1.0, hall.robot.goal_x_m)
@@ -176,25 +177,25 @@ def test_a_file_extends_shared_defaults_and_finds_its_recording_in_its_folder(tm
 )
 def test_impossible_values_are_refused_by_path(change, message):
     with pytest.raises(SimError, match=message):
-        template(**change)
+        varied(**change)
 
 
 def test_only_numbers_of_people_and_robot_may_be_distributions():
     with pytest.raises(SimError, match="duration_s: only numbers under people, robot"):
-        ScenarioTemplate({**BASE, "duration_s": {"uniform": {"low": 10, "high": 20}}})
+        Scenario.from_data({**BASE, "duration_s": {"uniform": {"low": 10, "high": 20}}})
     varied = {**BASE, "robot": {"goal_x_m": {"choice": [10.0, 12.0]}}}
-    assert {ScenarioTemplate(varied).for_seed(seed).robot.goal_x_m for seed in range(9)} == {10, 12}
+    assert {Scenario.from_data(varied).draw(seed).robot.goal_x_m for seed in range(9)} == {10, 12}
 
 
 def test_two_people_with_the_same_name_are_refused():
     twins = {**BASE, "people": BASE["people"] * 2}
     with pytest.raises(SimError, match="must be unique, got worker twice"):
-        ScenarioTemplate(twins)
+        Scenario.from_data(twins)
 
 
 def test_files_that_are_not_scenarios_are_refused_by_name(tmp_path):
     with pytest.raises(SimError, match=r"cannot read .*none\.yaml"):
-        ScenarioTemplate.from_yaml(tmp_path / "none.yaml")
+        Scenario.from_yaml(tmp_path / "none.yaml")
     for text, message in (
         ("a: [", r"mine\.yaml is not valid YAML"),
         ("- a", r"mine\.yaml must hold lines of `key: value`, got a list"),
@@ -205,13 +206,13 @@ def test_files_that_are_not_scenarios_are_refused_by_name(tmp_path):
     ):
         (tmp_path / "mine.yaml").write_text(text)
         with pytest.raises(SimError, match=message):
-            ScenarioTemplate.from_yaml(tmp_path / "mine.yaml")
+            Scenario.from_yaml(tmp_path / "mine.yaml")
 
 
 def test_a_name_may_ask_for_a_version():
-    assert ScenarioTemplate.shipped("crossing_from_left@1").id == "crossing_from_left@1"
+    assert Scenario.shipped("crossing_from_left@1").id == "crossing_from_left@1"
     with pytest.raises(SimError, match="has version 1, got 'crossing_from_left@2'"):
-        ScenarioTemplate.shipped("crossing_from_left@2")
+        Scenario.shipped("crossing_from_left@2")
 
 
 def test_attentive_and_distracted_differ_only_in_the_gaze():
@@ -224,7 +225,7 @@ def test_attentive_and_distracted_differ_only_in_the_gaze():
     assert other.glances.notices_within_m == 0.0
 
 
-def test_a_crossing_run_by_name_is_drawn_by_its_seed():
+def test_a_crossing_is_drawn_by_its_seed():
     def first(scenario):
         seen = []
 
@@ -236,9 +237,19 @@ def test_a_crossing_run_by_name_is_drawn_by_its_seed():
             run_crossing(scenario, policy="assertive", seed=2, observer=look)
         return seen[0]
 
-    drawn = ScenarioTemplate.shipped("standing_in_aisle").for_seed(2)
-    by_name, given = first("standing_in_aisle"), first(drawn)
-    place = by_name.truth[0].position_odom_m
-    assert place.tobytes() == given.truth[0].position_odom_m.tobytes()
-    assert place == pytest.approx([drawn.people[0].route[0].x_m, drawn.people[0].route[0].y_m])
-    assert by_name.robot_state.position_odom_m[0] == pytest.approx(drawn.robot.start_x_m, abs=1e-9)
+    written = Scenario.shipped("standing_in_aisle")
+    drawn = written.draw(2)
+    place = [drawn.people[0].route[0].x_m, drawn.people[0].route[0].y_m]
+    for scenario in ("standing_in_aisle", written, drawn):
+        frame = first(scenario)
+        assert frame.truth[0].position_odom_m == pytest.approx(place)
+        start_m = frame.robot_state.position_odom_m[0]
+        assert start_m == pytest.approx(drawn.robot.start_x_m, abs=1e-9)
+
+
+def test_a_copy_with_other_values_keeps_the_medians():
+    written = varied()
+    copied = written.model_copy(update={"duration_s": 5.0})
+    assert copied.draw(3) is copied
+    assert copied.people == written.people
+    assert copied.model_copy(update={"duration_s": 20.0}) == written.with_values({}) != written
