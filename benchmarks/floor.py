@@ -31,7 +31,7 @@ from sim_tests import run_crossing
 from sim_tests.crossing import CrossingFrame
 from sim_tests.scenario import Scenario
 from sim_tests.study.report import Table
-from sim_tests.study.runs import named_templates
+from sim_tests.study.runs import named_scenarios
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 PAGE: Final = _ROOT / "docs" / "planners.md"
@@ -142,8 +142,8 @@ def limits_mps(frames: Sequence[CrossingFrame], way: Way) -> FloatArray:
 
 def lost_s(name: str, policy: str, seed: int) -> tuple[str, str, int, float, float]:
     """Return a row: seconds lost by the drive, and by the fastest way, over an empty hall."""
-    (template,) = named_templates([name])
-    scenario = template.for_seed(seed)
+    (scenario,) = named_scenarios([name])
+    scenario = scenario.draw(seed)
     among, alone = (
         run_crossing(each, policy=policy, seed=seed)
         for each in (scenario, scenario.without_people())
@@ -194,7 +194,7 @@ def main() -> int:
     parser = make_parser("benchmarks.floor", "Seconds that the limits of a policy cost at least.")
     parser.add_argument("--drive", action="store_true", help="drive anew")
     if parser.parse_args().drive:
-        names = (template.name for template in named_templates(["all"]))
+        names = (each.name for each in named_scenarios(["all"]))
         jobs = product(names, _POLICIES, _SEEDS)
         rows = Parallel(n_jobs=2, verbose=5)(delayed(lost_s)(*job) for job in jobs)
         with _ROWS.open("w", newline="", encoding="utf-8") as file:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from benchmarks.floor import PAGE, fastest_s, limits_mps, page, table, ways
 from sim_tests import run_crossing
-from sim_tests.study.runs import named_templates
+from sim_tests.study.runs import named_scenarios
 
 
 @pytest.mark.parametrize(("limit_mps", "gains", "brakes"), [(1.5, 1.0, 1.5), (0.6, 0.5, 1.0)])
@@ -39,8 +39,8 @@ def test_a_robot_waits_before_a_body_until_it_has_left() -> None:
 
 
 def test_nobody_is_driven_through() -> None:
-    (template,) = named_templates(["standing_in_aisle"])
-    scenario = template.for_seed(0)
+    (scenario,) = named_scenarios(["standing_in_aisle"])
+    scenario = scenario.draw(0)
     frames = run_crossing(scenario, policy="scanner").frames[::40]
     straight, *_ = ways(scenario)
     limits = limits_mps(frames, straight)
