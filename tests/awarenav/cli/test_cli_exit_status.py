@@ -46,7 +46,7 @@ def test_a_simulator_that_is_not_installed_is_one_line_and_2(failing, capsys):
     assert failing(error) == 2
     assert capsys.readouterr().err == (
         "awarenav policy show: the simulator needs pybullet, which is not installed; it is part of "
-        f"the extra 'sim': {install_command('sim')}\n"
+        f"the extra 'sim': {install_command('sim,bench')}\n"
     )
 
 
