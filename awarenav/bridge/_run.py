@@ -251,7 +251,7 @@ def _published_topics(
 
 def _is_file(map_option: str | None) -> bool:
     """Return whether the option names a file; no topic has a dot in its name."""
-    return map_option is not None and map_option.endswith((".yaml", ".yml"))
+    return map_option is not None and "." in map_option
 
 
 def _inputs(options: Any) -> BridgeInputs:

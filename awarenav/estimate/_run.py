@@ -30,7 +30,7 @@ from ._estimator import FrameEstimate, PeopleEstimator
 from ._networks import admit_options, choice_of_options, running_options
 from ._open_source import CAMERA_NUMBER, open_source
 from ._overlay import OverlayWriter
-from ._results import estimate_record, open_results, settings_hash
+from ._results import check_results, estimate_record, open_results, settings_hash
 from ._sources import ImageSource, SourceFrame
 
 # Frames that are read ahead, and how often a reading thread is asked whether it has ended.
@@ -159,14 +159,15 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
     with contextlib.ExitStack() as stack:
         source = open_source(options.source, topic=options.topic, fps=options.fps)
         stack.callback(source.close)
-        cameras, depth = _camera_and_depth(options, source)
-        # Refused before networks that the user may have to fetch.
-        frames = _readable(stack.enter_context(FramePrefetcher(source, options.frames)))
-        estimator, settings = _estimator(options, source, cameras, depth, networks)
+        check_results(options.out, resume=options.resume, overwrite=options.overwrite)
         overlay = None
         if options.overlay != "none":
             rate_hz, single = source.rate_hz or _SLIDESHOW_HZ, source.count == 1
             overlay = OverlayWriter(Path(options.overlay), rate_hz, AttentionCone(), single=single)
+        cameras, depth = _camera_and_depth(options, source)
+        # Refused before networks that the user may have to fetch.
+        frames = _readable(stack.enter_context(FramePrefetcher(source, options.frames)))
+        estimator, settings = _estimator(options, source, cameras, depth, networks)
         results, done = open_results(
             options.out, settings, resume=options.resume, overwrite=options.overwrite
         )

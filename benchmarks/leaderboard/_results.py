@@ -21,7 +21,7 @@ from ._safety import hazard_figures, margin_figures, reach_figures
 
 _AWARE, _BLIND, _TODAY, _COSTMAP = ROBOTS
 #: Heads of README's table of meetings.
-COLUMNS: Final = ("**awarenav**", "slow for all", "today's AMR: predicts; costmap")
+COLUMNS: Final = ("**awarenav**", "slow for all", "AMRs of today")
 _FILES: Final = ("README.md", "docs/simulation_results.md", "docs/safety.md")
 #: Pages with parts that are made here, each between two comments.
 PAGES: Final = tuple(ROOT / name for name in _FILES)
@@ -83,10 +83,10 @@ def _meetings(robots: Mapping[str, Standing]) -> Table:
         "impacts, had noticed": _noticed,
         "impacts, all": lambda each: _mean(each, "step_out_all"),
     }
-    # Telephones show four columns, and no fifth: the two of today share one.
+    # A telephone shows four narrow columns, and no fifth: the two of today share one.
     columns = [[robots[_AWARE]], [robots[_BLIND]], [robots[_TODAY], robots[_COSTMAP]]]
     return Table(
-        dict.fromkeys(("a meeting", *COLUMNS), ""),
+        dict.fromkeys(("", *COLUMNS), ""),
         [
             [title, *("; ".join(map(cell, column)) for column in columns)]
             for title, cell in lines.items()
@@ -115,9 +115,10 @@ def _price(robots: Mapping[str, Standing]) -> str:
     predicts, costmap = (times(robots[name], aware).text(2) for name in (_TODAY, _COSTMAP))
     scenarios = len({each.scenario for each in aware.ran})
     return _filled(
-        f"{aware.planned} meetings of each robot in {scenarios} scenarios, with a forward camera "
-        "(120°) and two laser scanners, today's AMR with the scanners alone; impacts are those "
-        "[expected per 1 000 meetings if people step out]"
+        f"Means of {aware.planned} meetings of each robot in {scenarios} scenarios. awarenav has a "
+        "forward camera (120°) and two laser scanners, the AMRs of today the scanners alone: the "
+        "first predicts people, the second has a costmap planner. Impacts are those [expected "
+        "per 1 000 meetings if people step out]"
         f"(docs/what_it_wins.md#step-out-impacts). awarenav takes {costmap} × the time of the AMR "
         f"with a costmap planner and {predicts} × that of the one that predicts people. Awareness "
         f"saves {saved_attentive} s a meeting with people who watch and {saved} s over all, beside "

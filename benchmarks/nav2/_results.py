@@ -105,7 +105,7 @@ def summary(path: Path = ROWS) -> str:
     The limit alone reaches Nav2, and the robot does not keep its path.
     """
     groups = _groups(path)
-    lines = ["| | **awarenav** | slow for all | Nav2 alone |", "| --- | --- | --- | --- |"]
+    lines = ["| | **awarenav** | slow for all | Nav2 |", "| --- | --- | --- | --- |"]
     for controller in sorted({stack.partition(", ")[0] for stack, _, _ in groups}):
         today = groups[f"{controller}, {_TODAY}", "", ""]
         attentive = [each for each in today if each.attention == "attentive"]
