@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from benchmarks.people._standing import DISPLACEMENTS
+from benchmarks.people import DISPLACEMENTS
 from nav_adapter import AwarenessPolicy
 from nav_adapter.reach import Reach
 from sim_tests.study.report import Table
