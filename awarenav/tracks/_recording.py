@@ -95,8 +95,6 @@ def read_recording(path: Path) -> Recording:
         AwarenavError: for a file that cannot be read, and for a line or value that is not valid.
     """
     records = read_records(path)
-    if not records:
-        raise AwarenavError(f"{path} has no frame")
     counts: Counter[str] = Counter(incomplete=_count_lines(path) - len(records))
     fixed = all(record["T_odom_camera"] is None for record in records)
     frames = []

@@ -27,7 +27,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     image = np.random.default_rng(0).integers(0, 255, (48, 64, 3), dtype=np.uint8)
     assert cv2.imwrite("good.png", image)
     Path("cut.png").write_bytes(Path("good.png").read_bytes()[:300])
-    for name in ("empty.jpg", "empty.jsonl", "empty.mcap", "old.jsonl"):
+    for name in ("empty.jpg", "empty.mcap", "old.jsonl"):
         Path(name).touch()
     Path("all").mkdir()
     for name in ("all/1.png", "all/2.png", "in_the_way"):
@@ -58,7 +58,6 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("bridge --robot robot.yaml --bag empty.mcap", "'empty.mcap' seems to be empty"),
         ("bridge --robot robot.yaml --scan s --map good.png", "good.png is not valid YAML"),
         ("policy show loop.yaml", "cannot read loop.yaml: Too many levels of symbolic links"),
-        ("tracks empty.jsonl", "empty.jsonl has no frame"),
     ],
 )
 def test_a_bad_file_is_told_in_one_line_before_networks(line, message, capsys):
