@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -33,7 +34,8 @@ def check_output(
     """
     if suffixes and out.suffix.lower() not in suffixes:
         raise AwarenavError(f"{option} must end in {' or '.join(suffixes)}, got {out}")
-    if out.resolve() in {path.resolve() for path in inputs if path is not None}:
+    # Not Path.resolve: a link that leads to itself is told by whoever reads it.
+    if os.path.realpath(out) in {os.path.realpath(path) for path in inputs if path is not None}:
         raise AwarenavError(f"{option} {out} would replace an input")
     if out.is_dir():
         raise AwarenavError(f"{option} must be a file, {out} is a folder")

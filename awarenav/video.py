@@ -1,4 +1,4 @@
-"""H.264 videos and animated WebP images, written with PyAV."""
+"""H.264 videos and animated WebP images, written with PyAV, of the extra ``sim``."""
 
 from __future__ import annotations
 
@@ -7,20 +7,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
 
+import av
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.installation import install_command
-
-from .errors import AwarenavError, MissingExtraError
-
-try:
-    import av
-except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise MissingExtraError(
-        "writing videos needs PyAV, which is not installed; it is part of the extra 'sim': "
-        + install_command("sim")
-    ) from cause
+from .errors import AwarenavError
 
 # Of each suffix: encoder, pixel format, options of the file and of the encoder. An animated image
 # repeats for ever (loop 0); its quality is 0 to 100, its compression 0 (fast) to 6 (small).

@@ -38,7 +38,7 @@ def did_you_mean(given: object, names: Iterable[str], *, cutoff: float = 0.6) ->
 def nearest_file(path: Path) -> str:
     """Return a hint at the file in the folder whose name, without its ending, is most similar."""
     try:
-        names = {each.stem: each.name for each in path.parent.iterdir()}
+        names = {each.stem: each.name for each in path.parent.iterdir() if each.name != path.name}
     except OSError:
         return ""
     near = difflib.get_close_matches(path.stem, names, n=1, cutoff=0.75)

@@ -53,16 +53,19 @@ def reinstall_command() -> str:
 def missing_simulator(module: str, python: tuple[int, int] = sys.version_info[:2]) -> str:
     """Return the message about a missing module of the extra ``sim``, with the way out.
 
+    The line also brings ``bench``, which most commands of the simulator need next.
+
     Args:
         module: name of the module.
         python: version of Python; PyBullet has no wheels for those after 3.11.
     """
-    cure = f"it is part of the extra 'sim': {install_command('sim')}"
+    install = install_command("sim,bench")
+    cure = f"it is part of the extra 'sim': {install}"
     if python > _NEWEST_OF_PYBULLET:
         cure = (
             f"PyBullet has no wheel for this Python {'.'.join(map(str, python))}. One with 3.11 "
             "beside it (`pipx install uv` brings uv): `uv venv --python 3.11 && . "
-            f".venv/bin/activate && uv {install_command('sim')}`"
+            f".venv/bin/activate && uv {install}`"
         )
     return f"the simulator needs {module}, which is not installed; {cure}"
 

@@ -64,13 +64,18 @@ def bridge_command(options: Any) -> int:
     )
     mask = _speed_mask(options, published)
     inputs = _inputs(options)
-    camera, map_cells, prediction = _files(options, inputs)
-    scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
-    networks, unfit = _networks(options)
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
 
     with ExitStack() as stack:
+        # What the user gave is refused before networks that they may have to fetch.
+        messages = None
+        if options.bag is not None:
+            messages = recorded_messages(options.bag, inputs)
+            stack.callback(messages.close)
+        camera, map_cells, prediction = _files(options, inputs)
+        scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
+        networks, unfit = _networks(options)
         recorder = None
         if options.record is not None:
             recorder = stack.enter_context(McapRecorder(options.record))
@@ -86,14 +91,12 @@ def bridge_command(options: Any) -> int:
         if scanners:
             _log("the shipped leg detector is made for simulated scans; see docs/laser.md")
         publisher: TopicPublisher | ReplayPublisher
-        if options.bag is None:
+        if messages is None:
             node = DdsNode(domain)
             stack.callback(node.close)
             publisher = TopicPublisher(node, published, recorder)
         else:
             publisher = ReplayPublisher(published, recorder)
-            messages = recorded_messages(options.bag, inputs)
-            stack.callback(messages.close)
         bridge = AwarenessBridge(
             policy,
             robot.profile(),
@@ -114,7 +117,7 @@ def bridge_command(options: Any) -> int:
         )
         if map_cells is not None:
             bridge.on_map(map_cells)
-        if isinstance(publisher, ReplayPublisher):
+        if messages is not None and isinstance(publisher, ReplayPublisher):
             static = static_transforms(messages, inputs, _log)
             replay = BagReplay(
                 messages, bridge, inputs, options.rate, publisher, static=static, viewer=viewer
@@ -248,7 +251,7 @@ def _published_topics(
 
 def _is_file(map_option: str | None) -> bool:
     """Return whether the option names a file; no topic has a dot in its name."""
-    return map_option is not None and map_option.endswith((".yaml", ".yml"))
+    return map_option is not None and "." in map_option
 
 
 def _inputs(options: Any) -> BridgeInputs:

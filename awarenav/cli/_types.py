@@ -11,11 +11,21 @@ import click
 
 from ..errors import not_one_of
 
+# No computer finishes more episodes, seeds or frames.
+_MOST: Final = 10**8
+
 
 class Whole(click.IntRange):
     """A whole number within limits, ``Whole(1)`` or ``Whole(1, 9)``."""
 
     name = "whole number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number, or fail: nothing has more than :data:`_MOST`."""
+        number = super().convert(value, param, ctx)
+        if number > _MOST:
+            self.fail(f"must be at most {_MOST}, got {number}", param, ctx)
+        return number
 
 
 class Number(click.FloatRange):
@@ -69,10 +79,10 @@ class Seeds(click.ParamType[tuple[int, ...]]):
             seeds = range(int(first), int(last) + 1) if dash else range(int(first))
         except ValueError:
             seeds = range(0)
-        if not seeds:
+        if not 0 < seeds.stop - seeds.start <= _MOST:
             self.fail(
-                "must be a number of seeds of at least 1, or the first and the last as 10-19, got "
-                f"{str(value)!r}",
+                f"must be a number of seeds from 1 to {_MOST}, or the first and the last as 10-19, "
+                f"got {str(value)!r}",
                 param,
                 ctx,
             )

@@ -13,7 +13,7 @@ from perception import AttentionCone
 from perception.arrays import ImageRgb
 
 from ..errors import AwarenavError, MissingExtraError
-from ..files import atomic_path
+from ..files import atomic_path, require_writable
 from ..overlay import OverlaidPerson, draw_people
 from ._estimator import FrameEstimate
 from ._pictures import IMAGE_SUFFIXES
@@ -85,13 +85,7 @@ class OverlayWriter(AbstractContextManager["OverlayWriter"]):
             )
         if self._is_video:
             _video_writer()  # fails before the first estimate if PyAV is not installed
-        folder = path.parent if self._is_file else path
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as cause:
-            raise AwarenavError(
-                f"cannot make the folder {folder}: {cause.strerror or cause}"
-            ) from cause
+        require_writable(path.parent if self._is_file else path)
 
     def add(self, estimate: FrameEstimate) -> None:
         """Draw an estimate and write the image."""

@@ -15,7 +15,7 @@ from perception.layouts import COCO_NAMES, FOOT_NAMES, LEFT_SHOULDER, RIGHT_SHOU
 from tracking import PersonTrack
 
 from ..errors import AwarenavError
-from ..files import check_output
+from ..files import check_output, require_writable
 from ..records import Record, RecordFile, continue_records, read_records, write_records
 from ._estimator import FrameEstimate
 
@@ -128,6 +128,16 @@ def settings_hash(settings: Mapping[str, object]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
+def check_results(path: Path, *, resume: bool = False, overwrite: bool = False) -> None:
+    """Refuse what :func:`open_results` refuses, but for other settings, before any work."""
+    check_output(path, (".jsonl",))
+    if path.exists() and not resume and not overwrite:
+        raise AwarenavError(
+            f"{path} exists already: --resume continues it, --overwrite replaces it"
+        )
+    require_writable(path.parent)
+
+
 def open_results(
     path: Path, settings: str, *, resume: bool = False, overwrite: bool = False
 ) -> tuple[RecordFile, frozenset[str]]:
@@ -143,13 +153,8 @@ def open_results(
         AwarenavError: for another suffix, and for an existing file that may not be replaced or
             cannot be continued.
     """
-    check_output(path, (".jsonl",))
-    exists = path.exists()
-    if exists and not resume and not overwrite:
-        raise AwarenavError(
-            f"{path} exists already: --resume continues it, --overwrite replaces it"
-        )
-    if not (exists and resume):
+    check_results(path, resume=resume, overwrite=overwrite)
+    if not (path.exists() and resume):
         write_records(path, ())
         return RecordFile(path), frozenset()
     others = {str(record.get("settings")) for record in read_records(path)} - {settings}

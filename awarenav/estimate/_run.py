@@ -8,11 +8,11 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,7 +30,7 @@ from ._estimator import FrameEstimate, PeopleEstimator
 from ._networks import admit_options, choice_of_options, running_options
 from ._open_source import CAMERA_NUMBER, open_source
 from ._overlay import OverlayWriter
-from ._results import estimate_record, open_results, settings_hash
+from ._results import check_results, estimate_record, open_results, settings_hash
 from ._sources import ImageSource, SourceFrame
 
 # Frames that are read ahead, and how often a reading thread is asked whether it has ended.
@@ -159,11 +159,15 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
     with contextlib.ExitStack() as stack:
         source = open_source(options.source, topic=options.topic, fps=options.fps)
         stack.callback(source.close)
-        estimator, settings = _estimator(options, source, networks)
+        check_results(options.out, resume=options.resume, overwrite=options.overwrite)
         overlay = None
         if options.overlay != "none":
             rate_hz, single = source.rate_hz or _SLIDESHOW_HZ, source.count == 1
             overlay = OverlayWriter(Path(options.overlay), rate_hz, AttentionCone(), single=single)
+        cameras, depth = _camera_and_depth(options, source)
+        # Refused before networks that the user may have to fetch.
+        frames = _readable(stack.enter_context(FramePrefetcher(source, options.frames)))
+        estimator, settings = _estimator(options, source, cameras, depth, networks)
         results, done = open_results(
             options.out, settings, resume=options.resume, overwrite=options.overwrite
         )
@@ -173,7 +177,6 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
         total = options.frames
         if source.count is not None:
             total = source.count if total is None else min(source.count, total)
-        frames = stack.enter_context(FramePrefetcher(source, options.frames))
         bar = stack.enter_context(tqdm(total=total, desc="estimate", unit="frame", file=sys.stderr))
         drawing = stack.enter_context(ThreadPoolExecutor(1, "overlay"))
         drawn: Future[None] | None = None
@@ -205,10 +208,23 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
     return 1 if summary.problems else 0
 
 
-def _estimator(
-    options: Any, source: ImageSource, networks: Networks | None
-) -> tuple[PeopleEstimator, str]:
-    """Return the estimator for a source, and the hash of all settings that change estimates."""
+def _readable(frames: Iterable[SourceFrame]) -> Iterator[SourceFrame]:
+    """Return all frames, as soon as one of them shows a picture.
+
+    Raises:
+        AwarenavError: none does.
+    """
+    rest, problems = iter(frames), []
+    for frame in rest:
+        problems.append(frame)
+        if frame.image_rgb is not None:
+            return chain(problems, rest)
+    why = problems[0].problem if problems else "there is no frame"
+    raise AwarenavError(f"nothing could be estimated: {why}")
+
+
+def _camera_and_depth(options: Any, source: ImageSource) -> tuple[CameraChoice, DepthFiles | None]:
+    """Return the camera of a source's images, and the depth beside them."""
     depth = None
     if options.depth is not None:
         depth = DepthFiles(options.depth, source, options.frames)
@@ -219,6 +235,17 @@ def _estimator(
         _log(note)
     if source.untimed and options.tracks:
         _log("nothing tells the times: one image a second is assumed for speeds; give --fps")
+    return cameras, depth
+
+
+def _estimator(
+    options: Any,
+    source: ImageSource,
+    cameras: CameraChoice,
+    depth: DepthFiles | None,
+    networks: Networks | None,
+) -> tuple[PeopleEstimator, str]:
+    """Return the estimator for a source, and the hash of all settings that change estimates."""
     choice = choice_of_options(options, rendered=source.rendered, log=_log)
     if networks is None:
         networks = choice.load(min_score=options.min_score, **running_options(options))

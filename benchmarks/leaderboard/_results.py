@@ -15,10 +15,13 @@ from sim_tests.demo import reported_table, reported_text
 from sim_tests.study.measures import EpisodeRecord, Interval, bootstrap_interval, paired
 from sim_tests.study.report import Table
 
-from ._page import ROBOTS, Standing, rate_left, standings, touched
-from ._rows import RESULTS, ROOT, STEP_OUT, Board
+from ._page import ROBOTS, Standing, standings
+from ._rows import RESULTS, ROOT, Board
+from ._safety import hazard_figures, margin_figures, reach_figures
 
 _AWARE, _BLIND, _TODAY, _COSTMAP = ROBOTS
+#: Heads of README's table of meetings.
+COLUMNS: Final = ("**awarenav**", "slow for all", "AMRs of today")
 _FILES: Final = ("README.md", "docs/simulation_results.md", "docs/safety.md")
 #: Pages with parts that are made here, each between two comments.
 PAGES: Final = tuple(ROOT / name for name in _FILES)
@@ -55,42 +58,12 @@ def figures(board: Board, folder: Path = RESULTS) -> dict[str, str]:
     return {
         "meetings": f"{_meetings(robots).markdown()}\n\n{_price(robots)}",
         "nav2": summary(),
-        "hazards": _hazards(board, folder),
+        "hazards": hazard_figures(board, folder),
+        "margins": margin_figures(board, folder),
+        "reach": reach_figures(),
         "film": _filled(reported_text()),
         "lanes": f"```text\n{reported_table()}\n```",
     }
-
-
-def _hazards(board: Board, folder: Path) -> str:
-    """Return the figures of the hazards in the safety argument, of awarenav and of today's AMR."""
-    named = {each.row.name: each for each in standings(board, folder)}
-    few = Board.read(STEP_OUT)
-    steps = {each.row.name: each for each in standings(few, STEP_OUT)}
-
-    def both(scenario: str) -> str:
-        """Say how often the two touched somebody in a scenario of people who step out."""
-        own, other = (touched(steps[name], scenario) for name in (_AWARE, _TODAY))
-        return f"{own} (today's AMR {other})"
-
-    def impacts(name: str, people: str) -> str:
-        return named[name].impacts(people).replace(" (", ", at up to ").removesuffix(")")
-
-    lines = (
-        f"H3: of people who had looked and [stepped out](what_it_wins.md#people-who-step-out), the "
-        f"moving `balanced` touched {both('steps_out_near_aware')} who stood near, and "
-        f"{both('steps_out_far_aware')} who stood farther away; 0 of {few.seeds} leaves a true "
-        f"rate of up to {rate_left(few)}.",
-        f"H4: of people who step out behind a cart it touched {both('steps_out_behind_cart')}.",
-        f"H14: impacts per 1 000 meetings if those who never noticed it start to 1.6 m/s (time "
-        f"constant 0.35 s): {impacts(_AWARE, 'stress_never')}; today's AMR "
-        f"{impacts(_TODAY, 'stress_never')}.",
-        f"H18: impacts per 1 000 meetings with those whose last look is more than 1 s ago: "
-        f"{impacts(_AWARE, 'past')}; with `blind` {impacts(_BLIND, 'past')}.",
-    )
-    return "\n".join(
-        textwrap.fill(f"- {line}", 100, subsequent_indent="  ", break_on_hyphens=False)
-        for line in lines
-    )
 
 
 def _filled(text: str) -> str:
@@ -98,21 +71,26 @@ def _filled(text: str) -> str:
 
 
 def _meetings(robots: Mapping[str, Standing]) -> Table:
-    """Return a table with a column for each robot."""
+    """Return a table with the robots as columns."""
     count = {each.planned for each in robots.values()}.pop()
     lines: dict[str, Callable[[Standing], str]] = {
         "seconds lost, people who watch": lambda each: _mean(each, "time_lost_s", "attentive"),
         "seconds lost, all": lambda each: _mean(each, "time_lost_s"),
-        f"touched somebody while it moved, of {count}": lambda each: str(
+        f"touched while it moved, of {count}": lambda each: str(
             sum(record.moving_touched for record in each.ran)
         ),
-        "impacts, never noticed it": lambda each: _mean(each, "step_out_never"),
-        "impacts, had noticed it": _noticed,
+        "impacts, never noticed": lambda each: _mean(each, "step_out_never"),
+        "impacts, had noticed": _noticed,
         "impacts, all": lambda each: _mean(each, "step_out_all"),
     }
+    # A telephone shows four narrow columns, and no fifth: the two of today share one.
+    columns = [[robots[_AWARE]], [robots[_BLIND]], [robots[_TODAY], robots[_COSTMAP]]]
     return Table(
-        dict.fromkeys(("a meeting", *ROBOTS.values()), ""),
-        [[title, *map(cell, robots.values())] for title, cell in lines.items()],
+        dict.fromkeys(("", *COLUMNS), ""),
+        [
+            [title, *("; ".join(map(cell, column)) for column in columns)]
+            for title, cell in lines.items()
+        ],
     )
 
 
@@ -137,9 +115,10 @@ def _price(robots: Mapping[str, Standing]) -> str:
     predicts, costmap = (times(robots[name], aware).text(2) for name in (_TODAY, _COSTMAP))
     scenarios = len({each.scenario for each in aware.ran})
     return _filled(
-        f"{aware.planned} meetings of each robot in {scenarios} scenarios, with a forward camera "
-        "(120°) and two laser scanners, today's AMR with the scanners alone; impacts are those "
-        "[expected per 1 000 meetings if people step out]"
+        f"Means of {aware.planned} meetings of each robot in {scenarios} scenarios. awarenav has a "
+        "forward camera (120°) and two laser scanners, the AMRs of today the scanners alone: the "
+        "first predicts people, the second has a costmap planner. Impacts are those [expected "
+        "per 1 000 meetings if people step out]"
         f"(docs/what_it_wins.md#step-out-impacts). awarenav takes {costmap} × the time of the AMR "
         f"with a costmap planner and {predicts} × that of the one that predicts people. Awareness "
         f"saves {saved_attentive} s a meeting with people who watch and {saved} s over all, beside "

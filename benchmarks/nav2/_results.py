@@ -105,7 +105,7 @@ def summary(path: Path = ROWS) -> str:
     The limit alone reaches Nav2, and the robot does not keep its path.
     """
     groups = _groups(path)
-    lines = ["| | **awarenav** | slow for everybody | Nav2 alone |", "| --- | --- | --- | --- |"]
+    lines = ["| | **awarenav** | slow for all | Nav2 |", "| --- | --- | --- | --- |"]
     for controller in sorted({stack.partition(", ")[0] for stack, _, _ in groups}):
         today = groups[f"{controller}, {_TODAY}", "", ""]
         attentive = [each for each in today if each.attention == "attentive"]
@@ -113,7 +113,7 @@ def summary(path: Path = ROWS) -> str:
         rows = {
             "time among people who watch it": (*(_times(attentive, r) for r in robots), "1"),
             "time among all": (*(_times(today, each) for each in robots), "1"),
-            f"touched somebody while it moved, of {len(today)}": map(_touched, [*robots, today]),
+            f"touched while it moved, of {len(today)}": map(_touched, [*robots, today]),
             "impacts, never noticed; all": map(_impacts, [*robots, today]),
         }
         lines += [f"| {controller}: {name} | {' | '.join(row)} |" for name, row in rows.items()]

@@ -66,10 +66,12 @@ _SAME_PERSON_M: Final = 0.8
 # A slower robot counts as stopping.
 _STOPPING_MPS: Final = 0.05
 _MARGIN_M: Final = 0.7
+# Of each sign: whether it is a ring, α, and what it says.
 _LEGEND: Final = (
-    ("dot", awareness_colour(1.0), "has noticed the robot"),
-    ("dot", awareness_colour(0.0), "has not"),
-    ("ring", awareness_colour(0.0), "kept free by the planner"),
+    (False, 1.0, "has noticed"),
+    (False, 0.0, "has not"),
+    (True, 0.0, "kept free: unaware"),
+    (True, 0.5, "kept free: partly sure"),
 )
 
 #: Policies that ignore awareness: α says nothing about what the robot does.
@@ -193,15 +195,18 @@ def _picture(
 
 
 def _write_legend(image: ImageRgb, top: int) -> None:
-    for number, (sign, colour, text) in enumerate(_LEGEND):
-        middle = np.array([_EDGE_PX + 14.0, top + number * (_LINE_PX + 2) + 0.5 * _LINE_PX])
-        if sign == "dot":
-            draw_disc(image, middle, 11.0, colour)
-        else:
-            draw_disc(image, middle, 12.5, colour)
+    """Write each sign beside the one before, or where the room ends, below."""
+    left = _EDGE_PX
+    for is_ring, alpha, text in _LEGEND:
+        width = 38 + _TEXT.width_px(text)
+        if left + width > _LANE_LEFT_PX:
+            left, top = _EDGE_PX, top + _LINE_PX + 2
+        middle = np.array([left + 14.0, top + 0.5 * _LINE_PX])
+        draw_disc(image, middle, 12.5 if is_ring else 11.0, awareness_colour(alpha))
+        if is_ring:
             draw_disc(image, middle, 9.5, DARK)
-        corner = _EDGE_PX + 38, top + number * (_LINE_PX + 2)
-        _TEXT.write(image, text, corner, WHITE)
+        _TEXT.write(image, text, (left + 38, top), WHITE)
+        left += width + 14
 
 
 def draw_lane(row: ComparisonRow, free: CrossingResult, person: int, t_s: float | None) -> ImageRgb:

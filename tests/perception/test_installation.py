@@ -75,7 +75,8 @@ def test_a_checkout_that_is_not_installed(monkeypatch):
 
 
 def test_a_python_without_a_wheel_of_pybullet_is_told_the_way_to_another() -> None:
-    assert missing_simulator("joblib", (3, 11)).endswith(f"'sim': {install_command('sim')}")
+    install = install_command("sim,bench")
+    assert missing_simulator("joblib", (3, 11)).endswith(f"'sim': {install}")
     later = missing_simulator("pybullet", (3, 12))
     assert "this Python 3.12" in later
-    assert f"uv venv --python 3.11 && . .venv/bin/activate && uv {install_command('sim')}`" in later
+    assert f"uv venv --python 3.11 && . .venv/bin/activate && uv {install}`" in later

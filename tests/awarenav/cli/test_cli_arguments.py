@@ -128,6 +128,19 @@ def test_no_option_takes_a_number_that_is_not_finite(word):
             number.convert(word, None, None)
 
 
+def test_no_option_takes_a_count_that_no_computer_finishes():
+    counts = [
+        each.type
+        for command in COMMANDS.values()
+        for each in options_of(command).values()
+        if each.type.name in ("whole number", "seeds", "integer range")
+    ]
+    assert len(counts) > 20
+    for count in counts:
+        with pytest.raises(click.BadParameter, match=r"must be|not in the range"):
+            count.convert(str(10**20), None, None)
+
+
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
 def test_every_command_refuses_an_unknown_option_in_one_line(path, capsys):
     assert main([*path, "--no-such-option"]) == 2

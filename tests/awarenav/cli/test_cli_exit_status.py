@@ -36,7 +36,7 @@ def test_success_is_0(capsys):
 
 NO_SIMULATOR = (
     "awarenav policy show: the simulator needs pybullet, which is not installed; it is part of "
-    f"the extra 'sim': {install_command('sim')}\n"
+    f"the extra 'sim': {install_command('sim,bench')}\n"
 )
 
 

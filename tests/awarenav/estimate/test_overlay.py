@@ -263,7 +263,7 @@ def test_videos_folders_and_single_images_are_written(tmp_path):
     [
         ("a.gif", r"must be a \.mp4 file, a folder or 'none'"),
         ("a.png", r"must be a \.mp4 file, a folder or 'none'"),
-        ("file/deeper", "cannot make the folder"),
+        ("file/deeper", "cannot write to"),
     ],
 )
 def test_other_places_are_refused(tmp_path, name, message):

@@ -57,8 +57,12 @@ def test_what_simulates_refuses_without_pybullet_and_writes_nothing(tmp_path) ->
         ["tune", "--scenario", "crossing_attentive", "--out", "tune"],
         ["falsify", "--scenario", "crossing_attentive", "--out", "falsify"],
         ["watch", "crossing_attentive"],
+        ["replay", "run", "0"],
+        ["measures", "run"],
+        ["planners", "compare", "json:JSONDecoder"],
     ]
     found, said = statuses_without_pybullet(commands, tmp_path)
     assert found == [2] * len(commands), said
-    assert said.count(install_command("sim")) == len(commands)
+    assert said.count("the simulator needs ") == len(commands)
+    assert said.count(install_command("sim,bench")) == len(commands)
     assert not list(tmp_path.iterdir())

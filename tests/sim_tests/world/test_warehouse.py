@@ -111,5 +111,5 @@ def test_a_missing_simulator_is_named_with_its_extra(monkeypatch: pytest.MonkeyP
     again = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(again)
     for first_use in (again.require_pybullet, lambda: again.pybullet.connect):
-        with pytest.raises(MissingSimulatorError, match=re.escape(install_command("sim"))):
+        with pytest.raises(MissingSimulatorError, match=re.escape(install_command("sim,bench"))):
             first_use()
