@@ -214,9 +214,7 @@ def test_a_look_long_after_the_request_is_no_answer() -> None:
 
 
 @pytest.mark.parametrize(("after_s", "answers"), [(0.1, []), (0.2, []), (0.3, [0.3])])
-def test_a_look_before_anybody_could_react_is_no_answer(
-    after_s: float, answers: list[float]
-) -> None:
+def test_a_look_before_anybody_could_react_is_no_answer(after_s, answers) -> None:
     results = driven(answering(0.2 + after_s, 0.05), 2.0)
     assert [t for t, _ in requests(results)] == [0.2]
     assert [each.after_s for r in results for each in r.answers] == pytest.approx(answers)
@@ -250,16 +248,6 @@ def test_an_answer_allows_no_more_than_any_other_look(noticed: float) -> None:
     asked, unasked = (driven(looks, 6.0, policy=each) for each in (policy_of(), SILENT))
     assert [len(each.answers) for each in asked].count(1) == 1
     assert [numbers(each) for each in asked] == [numbers(each) for each in unasked]
-
-
-def test_nothing_is_remembered_of_somebody_who_did_not_look() -> None:
-    def believed(t_s: float) -> list[PersonTrack]:
-        (track,) = standing(BESIDE, awareness_lower=0.2)(t_s)
-        return [replace(track, noticed=0.3)]
-
-    results = driven(believed, 5.0)
-    assert requests(results)
-    assert {result.obstacles[0].awareness_lower for result in results} == {0.2}
 
 
 def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> None:
@@ -332,12 +320,7 @@ def histories(draw: st.DrawFn) -> list[tuple[float, float, tuple[PersonTrack, ..
 
 @settings(max_examples=30)
 @given(walk=histories(), robot=robots(), per_minute=st.integers(1, 3), gain_s=finite(0.0, 1.0))
-def test_requests_change_no_limit_and_keep_to_their_budget(
-    walk: list[tuple[float, float, tuple[PersonTrack, ...]]],
-    robot: Any,
-    per_minute: int,
-    gain_s: float,
-) -> None:
+def test_requests_change_no_limit_and_keep_to_their_budget(walk, robot, per_minute, gain_s) -> None:
     rules = AttentionRules(min_gain_s=gain_s, per_minute=per_minute)
     asks = NavAdapter(AwarenessPolicy(attention=rules), robot)
     silent = NavAdapter(SILENT, robot)

@@ -139,9 +139,7 @@ def test_within_the_limit_no_arc_meets_a_reach(count: int) -> None:
     mirrored=st.booleans(),
 )
 @settings(max_examples=60)
-def test_a_turned_mirrored_or_shifted_world_has_the_same_limits(
-    seed: int, angle: float, shift: tuple[float, float], mirrored: bool
-) -> None:
+def test_a_turned_mirrored_or_shifted_world_has_the_same_limits(seed, angle, shift, mirrored):
     rng, offset = np.random.default_rng(seed), np.array(shift)
     state = drawn_state(rng, DIFFERENTIAL)
     if seed % 4 == 0:
@@ -202,9 +200,7 @@ def test_a_robot_creeps_where_no_sensor_sees(speed: float, left: float, limit: f
 
 
 @pytest.mark.parametrize("clock_s", [0.0, 1000.0])
-def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(
-    clock_s: float,
-) -> None:
+def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(clock_s) -> None:
     def seen(bearing_rad: float, half_rad: float) -> float | None:
         return None if ahead_alone(bearing_rad, half_rad) is None else clock_s
 
@@ -227,9 +223,7 @@ def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(
     v=finite(-1.5, 1.5),
     w=finite(-2.0, 2.0),
 )
-def test_twists_of_the_envelope_are_not_clipped(
-    seed: int, speed: float, v: float, w: float
-) -> None:
+def test_twists_of_the_envelope_are_not_clipped(seed, speed, v, w) -> None:
     rng = np.random.default_rng(seed)
     state = robot_at(speed_mps=speed)
     people = drawn_people(rng, 2, state.position_odom_m, 1.0)

@@ -119,9 +119,7 @@ def passing_mps(
     course_rad=finite(-math.pi, math.pi),
     side=st.sampled_from([1.0, -1.0]),
 )
-def test_beside_the_circle_of_anybody_the_robot_may_drive(
-    name: str, alpha: float, along_m: float, course_rad: float, side: float
-) -> None:
+def test_beside_the_circle_of_anybody_the_robot_may_drive(name, alpha, along_m, course_rad, side):
     """For every awareness, course and place along the edge."""
     policy = AwarenessPolicy.preset(name)
     assert passing_mps(policy, alpha, along_m, course_rad, side) >= PASSING_MPS - 0.02

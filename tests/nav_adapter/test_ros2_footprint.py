@@ -79,9 +79,7 @@ class Loaded(Robot):
     more=st.tuples(metres, metres, metres),
     awareness=st.sampled_from([0.0, 0.95, None]),
 )
-def test_a_larger_footprint_never_raises_the_limit(
-    less: tuple[float, ...], more: tuple[float, ...], awareness: float | None
-) -> None:
+def test_a_larger_footprint_never_raises_the_limit(less, more, awareness) -> None:
     limits = [
         Loaded(awareness).with_load(outline(*sizes)).speed_limit_mps
         for sizes in ((0.0, 0.0, 0.0), less, tuple(np.add(less, more)))
@@ -152,9 +150,7 @@ def test_a_smaller_outline_does_not_shrink_the_robot() -> None:
         (outline(), "odom", 4.0, "holds 0.1 s longer"),
     ],
 )
-def test_a_footprint_that_is_refused_keeps_the_last_and_says_so(
-    corners: np.ndarray, frame: str, late_s: float, words: str
-) -> None:
+def test_a_footprint_that_is_refused_keeps_the_last_and_says_so(corners, frame, late_s, words):
     nav = Loaded()
     before = nav.with_load(outline(front=0.8))
     now_s = START_S + 0.9

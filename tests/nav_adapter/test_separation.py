@@ -31,12 +31,8 @@ def test_a_separation_too_small_for_a_float_gives_a_limit_of_0() -> None:
 
 @given(separation=finite(0.0, 30.0), human=finite(0.0, 3.0), **SETTINGS)
 def test_speed_is_the_root_of_the_protective_separation(
-    separation: float,
-    human: float,
-    deceleration_mps2: float,
-    reaction_time_s: float,
-    clearance_m: float,
-) -> None:
+    separation, human, deceleration_mps2, reaction_time_s, clearance_m
+):
     settings = {
         "deceleration_mps2": deceleration_mps2,
         "reaction_time_s": reaction_time_s,

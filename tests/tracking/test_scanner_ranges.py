@@ -88,9 +88,7 @@ def test_the_places_at_the_edge_of_the_rays_are_not_empty() -> None:
 
 @settings(deadline=None)
 @given(st.floats(-3.0, 3.0), st.floats(-2.0, 2.0), st.floats(-1.5, 1.5), st.floats(-1.2, 1.2))
-def test_rays_are_where_the_robot_was_when_they_were_measured(
-    yaw_rad: float, x_m: float, speed_mps: float, turn_radps: float
-) -> None:
+def test_rays_are_where_the_robot_was_when_they_were_measured(yaw_rad, x_m, speed_mps, turn_radps):
     """A wall at 6 m with one open sector, from a robot that drives and turns in the scan."""
     T = np.eye(4)
     T[:2, :2] = [

@@ -123,16 +123,6 @@ def test_people_who_cross_stay_two() -> None:
         assert (confirmed_counts(follow(scene))[40:] >= 2).all()
 
 
-def test_a_twin_that_walks_away_is_a_person_again() -> None:
-    scene = twin_scene(1)
-    merged = follow(scene)[-1]
-    assert [one.status for one in merged].count("confirmed") <= 1
-    last = np.array([5.0, 2.5 * math.sin(0.3 * 20.0)])
-    leaving = [[last, last + np.array([0.35 + 0.05 * step, 0.0])] for step in range(1, 31)]
-    counts = confirmed_counts(follow(scene + leaving))
-    assert counts[-1] == 2
-
-
 def test_a_person_with_a_twin_is_kept_as_long_unseen_as_anybody() -> None:
     missed_s = TrackerConfig().max_missed_s
     for seed in range(3):
@@ -149,9 +139,7 @@ def test_a_second_box_without_a_face_takes_no_awareness() -> None:
 
 
 @pytest.mark.parametrize("awareness", [(0.95, 0.05), (0.05, 0.95)])
-def test_two_boxes_on_one_body_are_as_aware_as_the_less_aware(
-    awareness: tuple[float, float],
-) -> None:
+def test_two_boxes_on_one_body_are_as_aware_as_the_less_aware(awareness) -> None:
     """A detector without suppression reports each person twice in every frame."""
     rng = np.random.default_rng(3)
     scene: Scene = [

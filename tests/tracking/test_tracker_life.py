@@ -28,9 +28,7 @@ def walk(
 
 
 @pytest.mark.parametrize("missed", [(), (1,), (2, 4)])
-def test_a_person_who_is_missed_now_and_then_is_still_confirmed(
-    missed: tuple[int, ...],
-) -> None:
+def test_a_person_who_is_missed_now_and_then_is_still_confirmed(missed) -> None:
     tracker = PersonTracker()
     for step in range(4 + 2 * len(missed)):
         now = step * PERIOD_S

@@ -129,9 +129,7 @@ FRAMES: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("changes", "message"), FRAMES)
-def test_a_refused_frame_is_named_and_changes_nothing(
-    changes: dict[str, Any], message: str
-) -> None:
+def test_a_refused_frame_is_named_and_changes_nothing(changes, message) -> None:
     tracker, twin = watched(Answers()), watched(Answers())
     frame = {"observations": seen(), "stamp_s": NOW_S, "T_odom_camera": CAMERA}
     with pytest.raises(TrackingError, match=message):
