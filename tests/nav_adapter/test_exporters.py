@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from nav_scenes import (
     ROBOT,
@@ -123,55 +123,6 @@ def test_the_cost_is_the_formula_summed_over_people(
         decay_m=0.5,
     )
     np.testing.assert_allclose(cost, expected, atol=1e-9)
-
-
-ROBOT_RADIUS_M = 0.45
-VELOCITIES = st.tuples(finite(-2, 2), finite(-2, 2))
-
-
-def least_gap_m(circle: Circle, velocity: np.ndarray, horizon_s: float) -> float:
-    """Return the smallest gap to a robot that starts at the origin, at constant velocities."""
-    x, y, vx, vy, radius = circle
-    dvx, dvy = vx - velocity[0], vy - velocity[1]
-    square = dvx * dvx + dvy * dvy
-    nearest_s = -(x * dvx + y * dvy) / square if square > 0.0 else 0.0
-    t_s = min(max(nearest_s, 0.0), horizon_s)
-    return math.hypot(x + t_s * dvx, y + t_s * dvy) - radius - ROBOT_RADIUS_M
-
-
-@given(circles=some_circles(1, 1), velocity=VELOCITIES, horizon_s=finite(0.5, 8))
-def test_the_half_plane_touches_the_velocity_obstacle(circles, velocity, horizon_s) -> None:
-    """The boundary point nearest to the velocity just touches the person."""
-    gap_m = least_gap_m(circles[0], np.array(velocity), horizon_s)
-    assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
-    ((nx, ny, bound),) = half_planes(
-        constraints_of(*circles), (0, 0), velocity, ROBOT_RADIUS_M, horizon_s=horizon_s
-    )
-    excess_mps = nx * velocity[0] + ny * velocity[1] - bound
-    assert (excess_mps >= 0.0) == (gap_m >= 0.0) or abs(excess_mps) < 1e-6 or abs(gap_m) < 1e-6
-    grazing = np.array(velocity) - excess_mps * np.array([nx, ny])
-    assert least_gap_m(circles[0], grazing, horizon_s) == pytest.approx(0.0, abs=1e-6)
-
-
-@given(
-    angle_rad=finite(-math.pi, math.pi),
-    depth_m=finite(0.02, 1.0),
-    velocity=VELOCITIES,
-    walking=VELOCITIES,
-    resolve_s=finite(0.1, 2.0),
-)
-def test_a_robot_inside_an_obstacle_gets_out_in_time(
-    angle_rad, depth_m, velocity, walking, resolve_s
-):
-    distance_m = 1.0 + ROBOT_RADIUS_M - depth_m
-    circle = (distance_m * math.cos(angle_rad), distance_m * math.sin(angle_rad), *walking, 1.0)
-    ((nx, ny, bound),) = half_planes(
-        constraints_of(circle), (0, 0), velocity, ROBOT_RADIUS_M, resolve_s=resolve_s
-    )
-    normal = np.array([nx, ny])
-    out = np.array(velocity) + max(bound - normal @ velocity, 0.0) * normal
-    apart = np.array(circle[:2]) + resolve_s * (np.array(walking) - out)
-    assert np.hypot(*apart) >= 1.0 + ROBOT_RADIUS_M - 1e-6
 
 
 def test_half_planes_agree_with_the_authors_library() -> None:

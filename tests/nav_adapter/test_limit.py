@@ -6,13 +6,14 @@ import math
 import time
 from dataclasses import replace
 
+import nav_scenes
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from limit_worlds import brute_force_mps, run_worlds
 
-from nav_adapter import AwarenessPolicy, RobotProfile
+from nav_adapter import AwarenessPolicy
 from nav_adapter.course import Course, contact_m, course_of, reach_at, starts_of
 from nav_adapter.limit import (
     in_the_path_mps,
@@ -23,14 +24,7 @@ from nav_adapter.limit import (
 from nav_adapter.reach import Reach
 from nav_adapter.rigid import Motion
 
-ROBOT = RobotProfile(
-    footprint_m=[(0.36, 0.25), (0.36, -0.25), (-0.36, -0.25), (-0.36, 0.25)],
-    max_speed_mps=1.5,
-    max_acceleration_mps2=1.0,
-    max_deceleration_mps2=1.0,
-    reaction_time_s=0.3,
-    drive="differential",
-)
+ROBOT = replace(nav_scenes.ROBOT, drive="differential")
 MARGIN_M = 0.40
 ANGLES = st.floats(-math.pi, math.pi)
 PLACES = st.tuples(st.floats(0.05, 6.0), ANGLES)
@@ -189,16 +183,7 @@ def test_a_robot_that_moves_sideways_looks_where_it_goes(place, left, top) -> No
     sideways = state(0.0, left=left)
     limit = limit_mps(person(place, top=top), course_of(ROBOT, sideways, 0.5))
     # The same with the robot turned to its course, and its footprint turned back.
-    turned = RobotProfile(
-        footprint_m=[(0.25, 0.36), (0.25, -0.36), (-0.25, -0.36), (-0.25, 0.36)],
-        **{
-            name: getattr(ROBOT, name)
-            for name in (
-                *("max_speed_mps", "max_acceleration_mps2", "max_deceleration_mps2"),
-                *("reaction_time_s", "drive"),
-            )
-        },
-    )
+    turned = replace(ROBOT, footprint_m=ROBOT.footprint_m[::-1, ::-1])
     ahead = state(left, heading=math.pi / 2)
     assert limit == pytest.approx(
         limit_mps(person(place, top=top), course_of(turned, ahead, 0.5)), abs=1e-6
@@ -206,14 +191,7 @@ def test_a_robot_that_moves_sideways_looks_where_it_goes(place, left, top) -> No
 
 
 def test_a_robot_that_may_start_in_any_direction_counts_people_in_all() -> None:
-    omni = RobotProfile(
-        footprint_m=ROBOT.footprint_m,
-        max_speed_mps=1.5,
-        max_acceleration_mps2=1.0,
-        max_deceleration_mps2=1.0,
-        reaction_time_s=0.3,
-        drive="holonomic",
-    )
+    omni = replace(ROBOT, drive="holonomic")
     at = starts_of(omni, state(0.0), 0.5)
     limits = [limit_mps(person((2.0, bearing)), at) for bearing in (0.0, 1.0, 2.5, math.pi)]
     assert limits == pytest.approx([limits[0]] * 4, abs=1e-6)
@@ -315,7 +293,7 @@ def test_a_robot_that_may_start_anywhere_has_a_round_protective_field(yaw_rate_r
 
 @pytest.mark.parametrize("yaw_rate_radps", [0.3, -0.8, 2.0, 5.0])
 def test_a_footprint_that_turns_stays_within_the_course(yaw_rate_radps: float) -> None:
-    robot = replace(ROBOT, drive="differential")
+    robot = ROBOT
     course = course_of(robot, state(0.6, yaw_rate_radps), 0.0)
     # The heading turns by up to half of the angle until the stop, off the chord.
     turned_rad = 0.5 * min(abs(yaw_rate_radps) * (0.3 + 0.5 * 0.6 / 1.0), math.pi)

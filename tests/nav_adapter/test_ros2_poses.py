@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -60,11 +59,7 @@ def told(motion: Motion, *after_s: float) -> RobotPoses:
 
 
 def pose_of(motion: Motion) -> np.ndarray:
-    cos, sin = math.cos(motion.heading_rad), math.sin(motion.heading_rad)
-    T = np.eye(4)
-    T[:2, :2] = [[cos, -sin], [sin, cos]]
-    T[:2, 3] = motion.x_m, motion.y_m
-    return T
+    return planar(motion.x_m, motion.y_m, motion.heading_rad)
 
 
 def seen(**changes: Any) -> PersonObservation:

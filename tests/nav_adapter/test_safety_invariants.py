@@ -12,6 +12,7 @@ from nav_policies import STEPS_S, Walk, driven, histories, policies, robots
 from nav_scenes import (
     SCANNER,
     crowds,
+    field_mps,
     finite,
     moved_person,
     moved_robot,
@@ -32,7 +33,8 @@ FEW = settings(max_examples=20)
 def walks(draw: st.DrawFn) -> Walk:
     """Updates with other people in each of them."""
     steps = draw(st.lists(STEPS_S, min_size=1, max_size=6))
-    return [(dt, draw(finite(-1.5, 1.5)), 0.0, draw(crowds())) for dt in steps]
+    turns = st.just(0.0) | finite(-1.0, 1.0)
+    return [(dt, draw(finite(-1.5, 1.5)), draw(turns), draw(crowds())) for dt in steps]
 
 
 def run(policy: AwarenessPolicy, robot: RobotProfile, walk: Walk) -> list[NavConstraints]:
@@ -119,27 +121,31 @@ def test_every_rate_is_bounded(policy: AwarenessPolicy, robot: RobotProfile, wal
             assert after.speed_limit_mps <= allowed + ROUNDING
 
 
-@FEW
+@settings(max_examples=40)
 @given(
     policy=policies(),
     robot=robots(),
     walk=walks(),
     angle=finite(-7.0, 7.0),
     shift=st.tuples(finite(-50, 50), finite(-50, 50)),
+    mirrored=st.booleans(),
 )
-def test_rotating_and_shifting_the_world_changes_no_constraint(policy, robot, walk, angle, shift):
-    here, there, now = NavAdapter(policy, robot), NavAdapter(policy, robot), 0.0
-    for dt, speed, _, people in walk:
+def test_a_turned_shifted_or_mirrored_world_has_the_same_constraints(
+    policy, robot, walk, angle, shift, mirrored
+):
+    twin = replace(robot, footprint_m=robot.footprint_m * [1.0, -1.0 if mirrored else 1.0])
+    here, there, now = NavAdapter(policy, robot), NavAdapter(policy, twin), 0.0
+    for dt, speed, yaw_radps, people in walk:
         now += dt
         tracks = tuple(replace(track, stamp_s=track.stamp_s + now) for track in people)
-        state = robot_at(now, speed_mps=speed)
+        state = replace(robot_at(now, speed_mps=speed), yaw_rate_radps=yaw_radps)
+        world = {"angle_rad": angle, "shift_m": np.asarray(shift), "mirrored": mirrored}
+        moved = moved_robot(state, **world)
         ours = here.update(tracks, state, now)
-        theirs = there.update(
-            [moved_person(track, angle, np.asarray(shift)) for track in tracks],
-            moved_robot(state, angle, np.asarray(shift)),
-            now,
-        )
-        assert theirs.speed_limit_mps == pytest.approx(ours.speed_limit_mps, abs=1e-6)
+        theirs = there.update([moved_person(track, **world) for track in tracks], moved, now)
+        for name in ("speed_limit_mps", "fastest_point_limit_mps", "other_way_limit_mps"):
+            assert getattr(theirs, name) == pytest.approx(getattr(ours, name), abs=1e-6), name
+        assert field_mps(theirs, moved) == pytest.approx(field_mps(ours, state), abs=5e-3)
         assert [alert.kind for alert in theirs.alerts] == [alert.kind for alert in ours.alerts]
         for a, b in zip(ours.obstacles, theirs.obstacles, strict=True):
             assert b.radius_m == pytest.approx(a.radius_m, abs=1e-8)

@@ -42,31 +42,26 @@ def pair_scene(
     *,
     apart_m: float = 0.4,
     seconds: float = 20.0,
-    hidden_s: tuple[float, float] | None = None,
     crossing: bool = False,
 ) -> Scene:
     """Return frames of two people beside each other, each detected in a share of the frames.
 
-    ``hidden_s`` has the mean time in which the second is visible, and hidden. People who cross
-    pass each other every four seconds.
+    People who cross pass each other every four seconds.
     """
     rng = np.random.default_rng([8, seed])
     angle = rng.uniform(0.0, 2.0 * math.pi)
     offset = apart_m * np.array([math.cos(angle), math.sin(angle)])
     frames: Scene = []
-    visible = True
     for frame in range(round(seconds / PERIOD_S)):
         t = frame * PERIOD_S
         place = np.array([5.0, 2.5 * math.sin(0.3 * t)])
         other = place + (
             np.array([apart_m / 2.0, 3.0 * math.sin(math.pi * t / 4.0)]) if crossing else offset
         )
-        if hidden_s is not None and rng.random() < PERIOD_S / hidden_s[0 if visible else 1]:
-            visible = not visible
         seen = []
         if rng.random() < shares[0]:
             seen.append(place + rng.normal(0.0, NOISE_M, 2))
-        if visible and rng.random() < shares[1]:
+        if rng.random() < shares[1]:
             seen.append(other + rng.normal(0.0, NOISE_M, 2))
         frames.append(seen)
     return frames
