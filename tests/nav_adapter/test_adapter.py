@@ -235,6 +235,7 @@ def limit_for(
     return NavAdapter(policy, ROBOT).update((person(position=position),), state, 0.0)
 
 
+@FEW
 @given(bearing=finite(-math.pi, math.pi), distance=finite(0.5, 4.0))
 def test_a_robot_limits_itself_the_way_it_drives(bearing: float, distance: float) -> None:
     """Backwards as forwards: the robot is as long behind as ahead."""
@@ -278,6 +279,7 @@ def test_the_limiting_rule_and_person_are_named(first: int) -> None:
     assert nearest_unaware.limited_by == "track 7: reach"
 
 
+@FEW
 @given(distance=finite(0.0, 6.0), bearing=finite(-math.pi, math.pi), share=finite(0.0, 1.0))
 def test_who_obeys_can_always_brake(distance: float, bearing: float, share: float) -> None:
     allowed = limit_for(bearing, distance, 0.0).speed_limit_mps

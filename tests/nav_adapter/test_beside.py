@@ -67,7 +67,7 @@ PRESETS = st.sampled_from(["balanced", "assertive", "conservative", "blind"])
 ALPHAS = finite(0.0, 1.0)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     name=PRESETS,
     alpha=ALPHAS,
@@ -93,7 +93,7 @@ def test_a_centimetre_more_room_is_worth_a_tenth_of_a_metre_per_second_at_most(
     assert -FINEST_MPS <= far - near <= min(most_mps + FINEST_MPS, 0.1)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     name=PRESETS,
     alpha=ALPHAS,
@@ -110,7 +110,7 @@ def test_more_room_is_never_slower(name, alpha, along_m, gap_m, more_m, speed_mp
     assert near <= far + FINEST_MPS
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     name=PRESETS,
     alphas=st.tuples(ALPHAS, ALPHAS).map(sorted),

@@ -51,7 +51,7 @@ def limit_of(reach: Reach, turn_rad: float = 0.0) -> float:
     return lowest
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     place=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0)),
     walk=st.tuples(st.sampled_from([0.0, 0.0, 0.5, 1.0, 1.4]), st.floats(-math.pi, math.pi)),
@@ -77,7 +77,7 @@ def test_who_keeps_to_their_motion_never_makes_a_robot_brake_harder_than_it_can(
     assert limit_of(later, turn_rad) >= share * before - BRAKING_MPS2 * CYCLE_S - SLACK_MPS
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     place=st.tuples(st.floats(-1.0, 5.0), st.floats(-2.0, 2.0)),
     velocity=st.tuples(st.floats(-1.4, 1.4), st.floats(-1.4, 1.4)),
@@ -138,7 +138,7 @@ def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
         assert then - 0.02 <= field[0, 0] <= then + 1e-3
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     place=st.tuples(st.floats(1.0, 5.0), st.floats(-2.0, 2.0)),
     left_s=st.floats(AVERTED_LEFT_S, 3.5),
@@ -189,7 +189,7 @@ def test_a_track_without_a_newer_frame_knows_nothing_better(left_s, departed_mps
     assert after.speed_limit_mps <= before.speed_limit_mps + 1e-6
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     ahead_m=st.floats(8.0, 12.0),
     beside_m=st.floats(-1.6, 1.6),
@@ -221,7 +221,7 @@ def test_a_robot_at_its_limit_brakes_in_time_beside_people_who_walk_past(
         driven_m += speed_mps * CYCLE_S
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     walk=st.tuples(st.floats(0.12, 1.4), st.floats(-math.pi, math.pi)),
     place=st.tuples(st.floats(0.8, 4.0), st.floats(-1.6, 1.6)),

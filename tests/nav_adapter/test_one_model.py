@@ -28,7 +28,7 @@ from tracking import PersonTrack
 
 POLICY = AwarenessPolicy.preset("balanced")
 DIFFERENTIAL = replace(ROBOT, drive="differential")
-STATES = [300, pytest.param(1000, marks=pytest.mark.full)]
+STATES = [120, pytest.param(1000, marks=pytest.mark.full)]
 
 
 def drawn_state(rng: np.random.Generator, robot: RobotProfile) -> RobotState:
@@ -109,7 +109,7 @@ def meets_on_an_arc(
     return False
 
 
-@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.full)], ids=str)
+@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.full)], ids=str)
 def test_within_the_limit_no_arc_meets_a_reach(count: int) -> None:
     rng, limited = np.random.default_rng(4), 0
     for index in range(count):

@@ -151,7 +151,7 @@ def field_at(scene: Scene, now: NavConstraints) -> float:
     return float(limits[0, 0])
 
 
-@settings(max_examples=80)
+@settings(max_examples=50)
 @given(scene=scenes())
 def test_the_field_is_never_above_the_limit_of_a_robot_that_gets_there(scene: Scene) -> None:
     now, then = drive(scene)

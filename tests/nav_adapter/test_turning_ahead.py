@@ -89,7 +89,7 @@ def test_looking_ahead_never_makes_a_twist_faster(tracks, state, twist, less_mps
     np.testing.assert_allclose(flatter, 0.0, atol=ROUNDING)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     tracks=crowds(),
     state=driving(),

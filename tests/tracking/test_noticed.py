@@ -102,7 +102,7 @@ def test_half_a_second_of_looking_gives_a_half() -> None:
     assert values[9] > 0.7
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     aside_deg=st.floats(12.0, 38.0),
     side=st.sampled_from([-1.0, 1.0]),
@@ -419,7 +419,7 @@ def test_a_scanner_that_falls_silent_ends_it_also_in_predictions() -> None:
     assert scene.run(0.5, camera=False).noticed == 0.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     direction=st.floats(-math.pi, math.pi),
     speed_mps=st.floats(0.8, 1.6),

@@ -43,7 +43,7 @@ frames = st.tuples(steps_s, crowds, st.sampled_from(["camera", "camera", LASER])
 
 
 @pytest.mark.parametrize("view", [None, VIEW], ids=["no view", "view"])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(sequence=st.lists(frames, max_size=25))
 def test_the_tracks_are_valid_after_any_sequence(view, sequence) -> None:
     config = TrackerConfig(max_pause_s=1e12, new_clock_after_s=1e5, awareness=REMEMBERS)

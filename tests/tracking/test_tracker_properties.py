@@ -64,7 +64,7 @@ frames = st.tuples(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.lists(frames, min_size=1, max_size=12), st.booleans())
 def test_any_finite_input_gives_valid_tracks_or_a_tracking_error(sequence, with_views) -> None:
     tracker = both(REMEMBERS)

@@ -103,7 +103,7 @@ class Encounter:
     mirrored=st.booleans(),
     shift=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)),
 )
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_reactions_do_not_depend_on_where_the_world_lies(seed, turn_rad, mirrored, shift):
     """Social forces are left out where the world is mirrored: people step to the right there."""
     encounter, world = Encounter.drawn(seed), World(turn_rad, mirrored, shift)
@@ -115,7 +115,7 @@ def test_reactions_do_not_depend_on_where_the_world_lies(seed, turn_rad, mirrore
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_nobody_who_waits_steps_towards_the_path_of_the_robot(seed):
     encounter = Encounter.drawn(seed, "wait")
     robot = encounter.robot
