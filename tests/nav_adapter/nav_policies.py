@@ -69,9 +69,7 @@ def reach_rules(draw: st.DrawFn) -> ReachRules:
     )
 
 
-WITHOUT = st.sampled_from(
-    [(), (), (), SCANNER, *((each,) for each in (*SCANNER, "unseen"))],
-)
+WITHOUT = st.sampled_from([(), (), (), SCANNER, *((each,) for each in (*SCANNER, "unseen"))])
 
 
 @st.composite

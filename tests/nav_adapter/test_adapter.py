@@ -25,13 +25,7 @@ from nav_scenes import (
 )
 from shapely import Point
 
-from nav_adapter import (
-    AwarenessPolicy,
-    NavAdapter,
-    NavConstraints,
-    NavError,
-    PersonObstacle,
-)
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, PersonObstacle
 from nav_adapter.course import course_of
 from nav_adapter.limit import limit_mps
 from nav_adapter.reach import Reach
@@ -200,10 +194,7 @@ def test_the_limit_of_a_crowd_is_the_lowest_of_its_people_to_the_bit(policy, rob
 
 @pytest.mark.parametrize("preset", ["field", "blind", "conservative", "balanced", "assertive"])
 @FEW
-@given(
-    exponents=st.tuples(*[st.floats(-8.0, 308.0)] * 4),
-    age_s=st.sampled_from([0.0, 0.3, 30.0]),
-)
+@given(exponents=st.tuples(*[st.floats(-8.0, 308.0)] * 4), age_s=st.sampled_from([0.0, 0.3, 30.0]))
 def test_finite_tracks_give_constraints_or_an_error_of_the_package(preset, exponents, age_s):
     position_m, speed_mps, variance_m2, variance_m2ps2 = (10.0**each for each in exponents)
     track = replace(

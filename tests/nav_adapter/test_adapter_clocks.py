@@ -6,15 +6,7 @@ import logging
 from itertools import pairwise
 
 import pytest
-from nav_scenes import (
-    ROBOT,
-    T_ODOM_CAMERA,
-    numbers,
-    observed,
-    person,
-    policy_radius_m,
-    robot_at,
-)
+from nav_scenes import ROBOT, T_ODOM_CAMERA, numbers, observed, person, policy_radius_m, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
 from tracking import PersonTracker

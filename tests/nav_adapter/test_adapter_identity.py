@@ -98,12 +98,7 @@ def test_a_reused_id_frees_nobody(at: Places, lost_for: int, gone: str, status: 
 
 
 @FEW
-@given(
-    policy=policies(),
-    robot=robots(),
-    walk=histories(8),
-    ids=st.permutations(range(40, 80)),
-)
+@given(policy=policies(), robot=robots(), walk=histories(8), ids=st.permutations(range(40, 80)))
 def test_other_ids_change_the_ids_alone(policy, robot, walk, ids) -> None:
     one, other, now = NavAdapter(policy, robot), NavAdapter(policy, robot), 0.0
     for dt, speed_mps, _, people in walk:

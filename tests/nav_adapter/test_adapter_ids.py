@@ -49,27 +49,14 @@ def test_at_first_sight_awareness_raises_no_limit(alpha: float) -> None:
     assert limit > lowest or alpha < 0.5
 
 
-def test_frames_of_a_tentative_track_count_as_sight() -> None:
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    tentative = replace(somebody(1, (2.5, 0.0), 0.0), status="tentative")
-    seen(adapter, 5, tentative)
-    limit = frame(adapter, 5 * PERIOD_S, somebody(1, (2.5, 0.0), 0.95)).speed_limit_mps
-    unaware = frame(
-        NavAdapter(AwarenessPolicy(), ROBOT), 0.0, somebody(1, (2.5, 0.0), 0.0)
-    ).speed_limit_mps
-    assert limit > unaware
-
-
-def test_repeated_tracks_are_no_longer_sight() -> None:
-    """Ten updates with one frame are one sighting."""
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    track = somebody(1, (2.5, 0.0), 0.95)
-    for k in range(5):
-        now = k * PERIOD_S
-        result = adapter.update((track,), robot_at(now, speed_mps=0.1), now)
-    unaware = frame(
-        NavAdapter(AwarenessPolicy(), ROBOT), 0.0, somebody(1, (2.5, 0.0), 0.0)
-    ).speed_limit_mps
+def test_frames_of_a_tentative_track_are_sight_and_repeats_of_one_frame_are_not() -> None:
+    ahead = somebody(1, (2.5, 0.0), 0.95)
+    unaware = frame(adapter(), 0.0, replace(ahead, awareness_lower=0.0)).speed_limit_mps
+    nav, repeats = adapter(), adapter()
+    seen(nav, 5, replace(ahead, status="tentative", awareness_lower=0.0))
+    assert frame(nav, 5 * PERIOD_S, ahead).speed_limit_mps > unaware
+    for now in (k * PERIOD_S for k in range(5)):
+        result = repeats.update((ahead,), robot_at(now, speed_mps=0.1), now)
     assert result.speed_limit_mps <= unaware
 
 

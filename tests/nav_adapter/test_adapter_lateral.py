@@ -11,13 +11,7 @@ import pytest
 from hypothesis import given
 from nav_scenes import ROBOT, crowds, finite, moved_robot, person, robot_at
 
-from nav_adapter import (
-    AwarenessPolicy,
-    NavAdapter,
-    NavConstraints,
-    RobotProfile,
-    RobotState,
-)
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from nav_adapter.limit import FINEST, STEPS
 from nav_adapter.policies import AlertRules
 from tracking import PersonTrack

@@ -109,19 +109,6 @@ def test_somebody_lost_at_stamp_0_lets_the_limit_rise_too() -> None:
     assert limits[2] == pytest.approx(limits[0] + 0.30)
 
 
-def test_without_the_rule_the_limit_jumps() -> None:
-    results = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
-    limits = [each.speed_limit_mps for each in results]
-    assert max(after - before for before, after in pairwise(limits)) > 1.0
-    assert limits[-1] == MAXIMUM_MPS
-
-
-def test_somebody_whose_place_is_shown_empty_is_gone_at_once() -> None:
-    seen = lose(NavAdapter(POLICY, ROBOT), 0.5, place_empty=True)
-    plain = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
-    assert [numbers(one) for one in seen] == [numbers(one) for one in plain]
-
-
 def test_a_robot_that_drives_away_from_a_lost_person_is_free_of_them() -> None:
     """Never slower than if the person were still held."""
     lost, held = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(0.7, hold_s=10.0), ROBOT)
@@ -139,12 +126,21 @@ def test_a_robot_that_drives_away_from_a_lost_person_is_free_of_them() -> None:
     assert freed
 
 
-def test_somebody_who_is_back_is_not_lost_any_more() -> None:
-    adapter, twin = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
-    lose(adapter, 0.2), lose(twin, 0.2)
+def test_who_is_back_or_shown_gone_or_was_lost_before_a_pause_is_not_lost_any_more() -> None:
+    """The limits are those of a policy without the rule, with which they jump."""
     back = person(4.2, position=(4.0, 0.0))
-    one, other = (each.update((back,), robot_at(4.2), 4.2) for each in (adapter, twin))
-    assert numbers(one) == numbers(other)
+    for seconds, people, now in ((0.2, (back,), 4.2), (0.0, (), 30.0)):
+        adapters = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
+        for each in adapters:
+            lose(each, seconds)
+        one, other = (each.update(people, robot_at(now), now) for each in adapters)
+        assert numbers(one) == numbers(other)
+    gone = lose(NavAdapter(POLICY, ROBOT), 0.5, place_empty=True)
+    plain = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
+    assert [numbers(one) for one in gone] == [numbers(one) for one in plain]
+    limits = [each.speed_limit_mps for each in plain]
+    assert max(after - before for before, after in pairwise(limits)) > 1.0
+    assert limits[-1] == MAXIMUM_MPS
 
 
 def test_a_track_that_was_never_more_than_tentative_is_not_lost() -> None:
@@ -153,14 +149,6 @@ def test_a_track_that_was_never_more_than_tentative_is_not_lost() -> None:
         now = step * PERIOD_S
         adapter.update((person(now, status="tentative"),), robot_at(now), now)
     assert adapter.update((), robot_at(0.3), 0.3).speed_limit_mps == MAXIMUM_MPS
-
-
-def test_after_a_pause_in_the_updates_lost_people_are_forgotten() -> None:
-    adapter, twin = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
-    for each in (adapter, twin):
-        lose(each, 0.0)
-    one, other = (each.update((), robot_at(30.0), 30.0) for each in (adapter, twin))
-    assert numbers(one) == numbers(other)
 
 
 def test_the_people_kept_are_bounded_by_those_of_the_last_seconds() -> None:

@@ -35,6 +35,9 @@ def test_it_counts_as_that_awareness_and_never_lowers_it() -> None:
     aware = constraints(replace(near, awareness_lower=0.6))
     assert numbers(constraints(noticing(near))) == numbers(aware)
     assert aware.speed_limit_mps > constraints(near).speed_limit_mps + 0.2
+    for belief, lower in ((0.49, 0.0), (0.5, 0.6)):
+        (obstacle,) = constraints(noticing(near, belief)).obstacles
+        assert obstacle.awareness_lower == lower
     half = with_rule(AwarenessPolicy(), 0.4)
     assert numbers(constraints(noticing(near), policy=half)) == numbers(
         constraints(replace(near, awareness_lower=0.4), policy=half)
@@ -43,11 +46,6 @@ def test_it_counts_as_that_awareness_and_never_lowers_it() -> None:
     assert numbers(constraints(noticing(looks), policy=half)) == numbers(
         constraints(looks, policy=half)
     )
-
-
-def test_a_belief_of_one_half_counts() -> None:
-    (obstacle,) = constraints(noticing(person(), 0.5)).obstacles
-    assert obstacle.awareness_lower == 0.6
 
 
 @pytest.mark.parametrize("name", ["conservative", "assertive", "blind"])

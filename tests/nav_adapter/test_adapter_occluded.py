@@ -69,8 +69,7 @@ class Cycle:
 def after_vanishing(place_m: tuple[float, float], change: Change, seconds: float) -> list[Cycle]:
     """Show a standing person for 3 s, then scans that are changed and show nobody."""
     tracker = PersonTracker(
-        TrackerConfig(awareness=POLICY.filter),
-        sensors={"laser": SensorConfig(view=ScannerView())},
+        TrackerConfig(awareness=POLICY.filter), sensors={"laser": SensorConfig(view=ScannerView())}
     )
     adapter = NavAdapter(POLICY, ROBOT)
     place, T = np.array(place_m), SCANNER.T_base_scanner
@@ -130,12 +129,7 @@ def test_a_place_that_rays_have_passed_is_free_at_once() -> None:
 
 
 @pytest.mark.parametrize(
-    "change",
-    [
-        side(0.7, -1.5, 1.5),
-        sector(-20.0, 20.0, math.inf),
-    ],
-    ids=["truck", "dark clothes"],
+    "change", [side(0.7, -1.5, 1.5), sector(-20.0, 20.0, math.inf)], ids=["truck", "dark clothes"]
 )
 def test_what_no_ray_has_passed_is_not_empty(change) -> None:
     cycles = after_vanishing(PLACE_M, change, 9.0)

@@ -268,10 +268,7 @@ def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> 
 def test_a_neighbour_who_answered_is_not_asked_again_when_the_other_one_is() -> None:
     def pair(t_s: float) -> list[PersonTrack]:
         lower = 0.7 if 0.45 < t_s < 1.05 else 0.0
-        return [
-            _person(t_s, 1, BESIDE, awareness_lower=lower),
-            _person(t_s, 2, (3.5, 1.9)),
-        ]
+        return [_person(t_s, 1, BESIDE, awareness_lower=lower), _person(t_s, 2, (3.5, 1.9))]
 
     results = driven(pair, 20.0)
     assert [each.track_id for result in results for each in result.answers] == [1]
@@ -306,10 +303,7 @@ def histories(draw: st.DrawFn) -> list[tuple[float, float, tuple[PersonTrack, ..
             draw(st.sampled_from([1.0, 1.0, 0.4, 0.0, -0.5])),
             tuple(
                 replace(
-                    each,
-                    awareness_lower=draw(looks),
-                    noticed=draw(beliefs),
-                    time_since_seen_s=0.0,
+                    each, awareness_lower=draw(looks), noticed=draw(beliefs), time_since_seen_s=0.0
                 )
                 for each in people
             ),

@@ -15,12 +15,7 @@ from limit_worlds import brute_force_mps, run_worlds
 
 from nav_adapter import AwarenessPolicy
 from nav_adapter.course import Course, contact_m, course_of, reach_at, starts_of
-from nav_adapter.limit import (
-    in_the_path_mps,
-    limit_mps,
-    passing_radius_m,
-    stops_in_time,
-)
+from nav_adapter.limit import in_the_path_mps, limit_mps, passing_radius_m, stops_in_time
 from nav_adapter.reach import Reach
 from nav_adapter.rigid import Motion
 

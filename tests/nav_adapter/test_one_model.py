@@ -10,14 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from limit_worlds import drawn_robot
-from nav_scenes import (
-    ROBOT,
-    field_mps,
-    finite,
-    person,
-    robot_at,
-    settled_update,
-)
+from nav_scenes import ROBOT, field_mps, finite, person, robot_at, settled_update
 
 from nav_adapter import AwarenessPolicy, NavAdapter, RobotProfile, RobotState
 from nav_adapter.motion import clip_twists, clip_twists_ahead, twist_envelope

@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_scenes import (
-    ROBOT,
-    constraints_of,
-    crowds,
-    finite,
-    person,
-    robot_at,
-    some_circles,
-)
+from nav_scenes import ROBOT, constraints_of, crowds, finite, person, robot_at, some_circles
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
 from nav_adapter.exporters import predicted_circles, speed_limit_at

@@ -11,15 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_policies import Walk, driven, histories, robots
-from nav_scenes import (
-    ROBOT,
-    finite,
-    person,
-    policy_radius_m,
-    robot_at,
-    rotation,
-    settled_update,
-)
+from nav_scenes import ROBOT, finite, person, policy_radius_m, robot_at, rotation, settled_update
 
 from nav_adapter import AwarenessPolicy, RobotProfile
 from nav_adapter.limit import passing_radius_m

@@ -5,16 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from bridge_scenes import (
-    INFO,
-    MOUNT,
-    START_S,
-    Robot,
-    attentive,
-    image,
-    nobody,
-    odometry,
-)
+from bridge_scenes import INFO, MOUNT, START_S, Robot, attentive, image, nobody, odometry
 from nav_scenes import ROBOT
 
 from nav_adapter import AwarenessPolicy, NavConstraints

@@ -272,10 +272,7 @@ def test_requests_and_answers_are_no_fault_and_follow_the_warnings(means: str) -
         ("awarenav: answer", DiagnosticStatus.OK)
     ] * 2
     told = [{each.key: each.value for each in status.values} for status in answers]
-    assert told == [
-        {"track_id": "4", "after_s": "0.900"},
-        {"track_id": "7", "after_s": "1.250"},
-    ]
+    assert told == [{"track_id": "4", "after_s": "0.900"}, {"track_id": "7", "after_s": "1.250"}]
 
 
 MPPI_RADPS = 1.9

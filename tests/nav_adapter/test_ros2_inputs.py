@@ -18,13 +18,7 @@ from scipy.spatial.transform import Rotation
 from awarenav import AwarenavError
 from awarenav.estimate._pictures import as_rgb
 from nav_adapter import NavError
-from nav_adapter.ros2 import (
-    CameraMount,
-    TransformBuffer,
-    is_rectified,
-    optical_problem,
-    picture_of,
-)
+from nav_adapter.ros2 import CameraMount, TransformBuffer, is_rectified, optical_problem, picture_of
 from nav_adapter.ros2.conversions import pose_matrix, to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import Point, Quaternion
 from nav_adapter.ros2.messages.sensor_msgs import CompressedImage, Image, RegionOfInterest

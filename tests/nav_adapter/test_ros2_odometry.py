@@ -317,8 +317,7 @@ def test_a_twist_that_contradicts_the_poses_stops_the_robot(name, speed, heading
 def test_yaw_rates_that_contradict_the_poses_stop_the_robot(said: float) -> None:
     robot = Odometer()
     constraints = robot.drive(
-        3.0,
-        lambda now: odometry(now, driven(now, 0.4, 0.8), (0.4, 0.0, 0.0), (0.0, 0.0, said)),
+        3.0, lambda now: odometry(now, driven(now, 0.4, 0.8), (0.4, 0.0, 0.0), (0.0, 0.0, said))
     )
     assert "yaw rates" in constraints[-1].limited_by
 

@@ -40,8 +40,7 @@ motions = st.builds(
 def message(stamp_s: float, motion: Motion) -> Odometry:
     pose = Pose(Point(motion.x_m, motion.y_m, 0.0), yaw_quaternion(motion.heading_rad))
     twist = Twist(
-        Vector3(motion.forward_mps, motion.left_mps, 0.0),
-        Vector3(0.0, 0.0, motion.yaw_rate_radps),
+        Vector3(motion.forward_mps, motion.left_mps, 0.0), Vector3(0.0, 0.0, motion.yaw_rate_radps)
     )
     return Odometry(
         header(stamp_s, "odom"), "base_link", PoseWithCovariance(pose), TwistWithCovariance(twist)

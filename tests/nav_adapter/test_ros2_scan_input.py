@@ -22,11 +22,7 @@ from scan_scenes import planar, ranges_of, scan_message
 from scipy.spatial.transform import Rotation
 
 from nav_adapter.ros2 import ScannerInput, ScannerMount
-from nav_adapter.ros2.messages.geometry_msgs import (
-    Point,
-    Pose,
-    Quaternion,
-)
+from nav_adapter.ros2.messages.geometry_msgs import Point, Pose, Quaternion
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
 from nav_adapter.ros2.messages.std_msgs import Header
 from perception.laser import MapCells

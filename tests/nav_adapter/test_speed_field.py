@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 from nav_policies import robots
 from nav_scenes import ROBOT, SCANNER, crowds, finite, person, robot_at, settled_update
 
-from nav_adapter import (
-    AwarenessPolicy,
-    NavAdapter,
-    NavConstraints,
-    RobotProfile,
-    RobotState,
-)
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from nav_adapter.exporters import SpeedMap, speed_limit_at, time_cost
 from nav_adapter.policies import ReachRules
 from tracking import PersonTrack

@@ -11,13 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
 
-from nav_adapter import (
-    AwarenessPolicy,
-    NavAdapter,
-    NavConstraints,
-    RobotProfile,
-    RobotState,
-)
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from nav_adapter.motion import clip_twists, control_point, differential_drive, twist_envelope
 from perception.arrays import FloatArray
 

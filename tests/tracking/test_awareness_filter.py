@@ -134,10 +134,7 @@ def test_an_alpha_with_a_large_standard_deviation_is_no_evidence() -> None:
     assert evidence(None, None) is None
 
 
-@given(
-    mean=st.floats(-12.0, 12.0),
-    variance=st.floats(1e-4, 25.0),
-)
+@given(mean=st.floats(-12.0, 12.0), variance=st.floats(1e-4, 25.0))
 def test_an_estimate_is_a_probability_with_a_bounded_deviation(mean, variance) -> None:
     result = estimate(AwarenessBelief(mean, variance, mean - Z * math.sqrt(variance)))
     assert 0.0 <= result.awareness_lower <= result.awareness <= 1.0

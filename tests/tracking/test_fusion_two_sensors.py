@@ -6,15 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fusion_scenes import (
-    LASER,
-    Rig,
-    both,
-    laser_at,
-    play,
-    seen_by_camera,
-    seen_by_laser,
-)
+from fusion_scenes import LASER, Rig, both, laser_at, play, seen_by_camera, seen_by_laser
 from tracking_scenes import as_bytes, camera_at, nearest
 
 from perception import Camera
@@ -144,14 +136,6 @@ def test_identity_is_kept_through_the_blind_side_of_the_camera() -> None:
             for index, place in enumerate(people):
                 ids[index].add(nearest(tracks, place(stamp_s)).id)
     assert [len(found) for found in ids.values()] == [1, 1, 1]
-
-
-def test_people_whom_only_the_scanner_sees_are_confirmed_and_unaware() -> None:
-    tracker = both()
-    (track,) = play(tracker, Rig([stands(-3.0, 1.0)]).events(2.0))
-    assert track.status == "confirmed"
-    assert track.awareness_lower == 0.0
-    assert np.linalg.norm(track.position_odom_m - (-3.0, 1.0)) < 0.1
 
 
 def test_scans_neither_prove_nor_take_awareness() -> None:

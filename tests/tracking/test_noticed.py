@@ -8,27 +8,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fusion_scenes import (
-    LASER,
-    Rig,
-    both,
-    laser_at,
-    play,
-    seen_by_camera,
-    seen_by_laser,
-)
+from fusion_scenes import LASER, Rig, both, laser_at, play, seen_by_camera, seen_by_laser
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracking_scenes import FloatArray, as_bytes, camera_at, nearest, observe
 
 from perception import AttentionCone
-from tracking import (
-    AwarenessFilterConfig,
-    PersonTrack,
-    PersonTracker,
-    SensorConfig,
-    TrackerConfig,
-)
+from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, SensorConfig, TrackerConfig
 
 MEMORY_S = 4.0
 REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=MEMORY_S))

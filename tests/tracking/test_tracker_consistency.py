@@ -17,18 +17,11 @@ from tracking.covariances import drifted, matrices
 
 # Without gates.
 CONFIG = TrackerConfig(
-    gate_probability=1.0 - 1e-12,
-    gate_distance_m=50.0,
-    miss_cost=1e3,
-    confirm_logit=-100.0,
+    gate_probability=1.0 - 1e-12, gate_distance_m=50.0, miss_cost=1e3, confirm_logit=-100.0
 )
 
 
-@given(
-    low=st.floats(0.0, 0.01),
-    extra=st.floats(0.0, 0.01),
-    angle=st.floats(-np.pi, np.pi),
-)
+@given(low=st.floats(0.0, 0.01), extra=st.floats(0.0, 0.01), angle=st.floats(-np.pi, np.pi))
 def test_the_noise_floor_raises_eigenvalues_and_keeps_directions(low, extra, angle) -> None:
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     eigenvalues = np.array([low, low + extra])

@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 from tracking_scenes import CAMERA, PERIOD_S, FloatArray, observe
 
-from tracking import (
-    PersonTrack,
-    PersonTracker,
-    TrackerConfig,
-)
+from tracking import PersonTrack, PersonTracker, TrackerConfig
 
 Scene = list[list[FloatArray]]
 NOISE_M = 0.1

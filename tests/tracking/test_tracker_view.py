@@ -13,14 +13,7 @@ from tracking_scenes import CAMERA, PERIOD_S, FloatArray, camera_at, observe
 
 from perception import Camera
 from perception.surround import ring_of_views
-from tracking import (
-    CameraView,
-    PersonTrack,
-    PersonTracker,
-    SurroundView,
-    TrackerConfig,
-    View,
-)
+from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig, View
 
 CONFIG = TrackerConfig()
 LENS = Camera.from_fov(640, 480, math.radians(60.0))

@@ -9,13 +9,7 @@ import pytest
 from tracking_scenes import camera_at, observe
 
 from perception import PersonObservation
-from tracking import (
-    AwarenessFilterConfig,
-    PersonTrack,
-    PersonTracker,
-    SensorConfig,
-    TrackerConfig,
-)
+from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, SensorConfig, TrackerConfig
 
 REAR = "rear"
 PERIOD_S = 1.0 / 15.0
