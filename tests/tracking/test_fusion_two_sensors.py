@@ -6,16 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from fusion_scenes import LASER, Rig, both, laser_at, play, seen_by_camera, seen_by_laser
+from fusion_scenes import LASER, REMEMBERS, Rig, both, laser_at, play, seen_by_camera, seen_by_laser
 from tracking_scenes import as_bytes, camera_at, nearest
 
 from perception import Camera
 from tracking import (
-    AwarenessFilterConfig,
     CameraView,
     PersonTracker,
     ScannerView,
-    TrackerConfig,
     TrackingError,
 )
 
@@ -227,8 +225,7 @@ def test_rates_and_latencies_do_not_matter(camera_s, laser_s, camera_latency_s, 
         laser_latency_s=laser_latency_s,
     )
     events = rig.events(4.0)
-    config = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=4.0))
-    tracker, in_order = both(config), both(config)
+    tracker, in_order = both(REMEMBERS), both(REMEMBERS)
     tracks = play(tracker, events)
     assert as_bytes(tracks) == as_bytes(play(in_order, sorted(events, key=lambda e: e[0])))
     assert tracker.refused_late_frames == 0

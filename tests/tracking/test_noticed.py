@@ -4,70 +4,30 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fusion_scenes import LASER, Rig, both, laser_at, play, seen_by_camera, seen_by_laser
+from fusion_scenes import (
+    LASER,
+    MEMORY_S,
+    REMEMBERS,
+    Rig,
+    Scene,
+    both,
+    laser_at,
+    play,
+    seen_by_camera,
+    seen_by_laser,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tracking_scenes import FloatArray, as_bytes, camera_at, nearest, observe
+from tracking_scenes import as_bytes, camera_at, observe
 
 from perception import AttentionCone
-from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, SensorConfig, TrackerConfig
+from tracking import PersonTrack, PersonTracker, SensorConfig
 
-MEMORY_S = 4.0
-REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=MEMORY_S))
 CAMERA_S = 0.1
 OF_LOOKS = ("noticed", "aware_for_s", "departed_mps")
-
-
-class Scene:
-    """A robot with camera and scanner before one person; time goes on with :meth:`run`."""
-
-    def __init__(self, tracker: PersonTracker | None = None, *, seed: int = 0) -> None:
-        self.tracker = both(REMEMBERS) if tracker is None else tracker
-        self.rng = np.random.default_rng(seed)
-        self.tick = 0
-        self.place: FloatArray = np.array([3.0, 0.5])
-        self.tracks: tuple[PersonTrack, ...] = ()
-
-    @property
-    def now(self) -> float:
-        return 0.02 * self.tick
-
-    def run(
-        self,
-        duration_s: float,
-        *,
-        alpha: float | None = None,
-        camera: bool = True,
-        laser: bool = True,
-        velocity: tuple[float, float] = (0.0, 0.0),
-        others: tuple[tuple[float, float], ...] = (),
-        until: Callable[[PersonTrack], bool] | None = None,
-    ) -> PersonTrack:
-        """Advance; the camera sees the person or not, with α or without a usable face."""
-        for _ in range(round(duration_s / 0.02)):
-            self.tick += 1
-            self.place = self.place + 0.02 * np.asarray(velocity)
-            noise = 0.7 * self.rng.normal(size=(2, 2))
-            if self.tick % 5 == 0:
-                seen = [seen_by_camera(self.place, self.now, noise_m=noise[0], awareness=alpha)]
-                self.tracks = self.tracker.update(seen if camera else [], self.now, camera_at())
-            if self.tick % 2 == 0:
-                places = [self.place + 0.05 * noise[1], *others]
-                scan = [seen_by_laser(place, self.now) for place in places]
-                self.tracks = self.tracker.update(
-                    scan if laser else scan[1:], self.now, laser_at(), sensor=LASER
-                )
-            if until is not None and until(self.track):
-                break
-        return self.track
-
-    @property
-    def track(self) -> PersonTrack:
-        return nearest(self.tracks, self.place)
 
 
 def attentive(look_s: float = 0.6) -> Scene:
@@ -173,11 +133,7 @@ def test_it_lasts_for_the_memory_and_no_longer() -> None:
     assert kept.awareness_lower == 0.0
     assert scene.run(0.3, camera=False).noticed == 0.0
     assert scene.run(0.3, camera=False).status == "confirmed"
-
-
-def test_a_new_look_after_the_memory_counts_from_the_start() -> None:
-    scene = attentive()
-    assert scene.run(MEMORY_S, camera=False).noticed == 0.0
+    # A new look counts from the start.
     scene.run(0.2)
     assert 0.1 < scene.run(0.2, alpha=0.9).noticed < 0.4
 
@@ -355,34 +311,25 @@ def test_a_person_who_sets_off_ends_it(speed_mps: float, limit_s: float, directi
     assert scene.run(1.0, camera=False).noticed == 0.0
 
 
-def test_a_walker_keeps_it_until_they_come_faster() -> None:
-    scene = Scene()
-    scene.place = np.array([6.0, -2.0])
-    slow = {"velocity": (-0.5, 0.2)}
-    scene.run(1.5, **slow)
-    assert scene.run(0.8, alpha=0.9, **slow).noticed > 0.5
-    assert scene.run(1.5, camera=False, **slow).noticed > 0.5
-    assert scene.run(0.8, camera=False, velocity=(-1.4, 0.5)).noticed == 0.0
-
-
-@pytest.mark.parametrize(("turn_rad", "kept"), [(0.0, True), (0.9, False)])
-def test_a_walker_who_passes_keeps_it_on_their_course_alone(turn_rad: float, kept: bool) -> None:
+@pytest.mark.parametrize(
+    ("start_m", "velocity", "later"),
+    [
+        ((6.0, -2.0), (-0.5, 0.2), [(1.5, (-0.5, 0.2), True), (0.8, (-1.4, 0.5), False)]),
+        ((3.0, -3.5), (0.0, 1.2), [(1.0, (0.0, 1.2), True)]),
+        ((3.0, -3.5), (0.0, 1.2), [(1.0, (-0.94, 0.75), False)]),
+        ((6.0, -2.0), (-1.0, 0.3), [(0.9, (0.0, 0.0), True), (0.6, (-1.0, 0.3), False)]),
+    ],
+    ids=["comes faster", "passes", "turns", "stops and sets off"],
+)
+def test_a_walker_keeps_it_on_their_course_alone(start_m, velocity, later) -> None:
     """The speed towards the robot changes while they pass: not who walks on comes faster."""
-    scene, speed_mps = Scene(), 1.2
-    scene.place = np.array([3.0, -3.5])
-    scene.run(0.8, velocity=(0.0, speed_mps))
-    assert scene.run(0.8, alpha=0.9, velocity=(0.0, speed_mps)).noticed > 0.5
-    course = (-speed_mps * math.sin(turn_rad), speed_mps * math.cos(turn_rad))
-    assert (scene.run(1.0, camera=False, velocity=course).noticed > 0.5) is kept
-
-
-def test_a_walker_who_stops_and_sets_off_again_loses_it() -> None:
     scene = Scene()
-    scene.place = np.array([6.0, -2.0])
-    scene.run(1.0, velocity=(-1.0, 0.3))
-    scene.run(0.8, alpha=0.9, velocity=(-1.0, 0.3))
-    assert scene.run(0.9, camera=False).noticed > 0.5
-    assert scene.run(0.6, camera=False, velocity=(-1.0, 0.3)).noticed == 0.0
+    scene.place = np.array(start_m)
+    scene.run(1.0, velocity=velocity)
+    assert scene.run(0.8, alpha=0.9, velocity=velocity).noticed > 0.5
+    for seconds, then, kept in later:
+        noticed = scene.run(seconds, camera=False, velocity=then).noticed
+        assert noticed > 0.5 if kept else noticed == 0.0
 
 
 def test_a_gap_in_the_scans_ends_it_for_good() -> None:

@@ -6,15 +6,15 @@ import math
 from collections.abc import Callable
 
 import pytest
+from fusion_scenes import REMEMBERS
 from tracking_scenes import camera_at, observe
 
 from perception import PersonObservation
-from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, SensorConfig, TrackerConfig
+from tracking import PersonTrack, PersonTracker, SensorConfig
 
 REAR = "rear"
 PERIOD_S = 1.0 / 15.0
 LAG_S = 0.001
-REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=4.0))
 Sees = Callable[[int], bool]
 
 
