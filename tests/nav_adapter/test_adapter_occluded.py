@@ -185,7 +185,7 @@ def obstructions(draw: st.DrawFn):
     return change
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.floats(1.2, 3.5), st.floats(-25.0, 25.0), obstructions())
 def test_the_limit_rises_slowly_unless_rays_have_passed_the_place(range_m, bearing_deg, change):
     bearing = math.radians(bearing_deg)

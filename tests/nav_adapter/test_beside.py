@@ -67,7 +67,7 @@ PRESETS = st.sampled_from(["balanced", "assertive", "conservative", "blind"])
 ALPHAS = finite(0.0, 1.0)
 
 
-@settings(max_examples=25)
+@settings(max_examples=20)
 @given(name=PRESETS, alpha=ALPHAS, sigma_m=st.sampled_from([0.0, 0.05]), more_m=finite(0.001, 0.7))
 def test_a_centimetre_more_room_is_worth_a_tenth_of_a_metre_per_second_at_most(
     name, alpha, sigma_m, more_m

@@ -138,7 +138,7 @@ def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
         assert then - 0.02 <= field[0, 0] <= then + 1e-3
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     place=st.tuples(st.floats(1.0, 5.0), st.floats(-2.0, 2.0)),
     left_s=st.floats(AVERTED_LEFT_S, 3.5),
@@ -189,7 +189,7 @@ def test_a_track_without_a_newer_frame_knows_nothing_better(left_s, departed_mps
     assert after.speed_limit_mps <= before.speed_limit_mps + 1e-6
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     ahead_m=st.floats(8.0, 12.0),
     beside_m=st.floats(-1.6, 1.6),

@@ -30,7 +30,7 @@ ORDERED = (
 ROUNDING = 1e-9
 
 
-@settings(max_examples=25)
+@settings(max_examples=20)
 @given(robot=st.just(ROBOT) | robots(), walk=histories(12))
 def test_presets_are_ordered_at_every_instant(robot: RobotProfile, walk: Walk) -> None:
     results = {name: driven(AwarenessPolicy.preset(name), robot, walk) for name in PRESETS}

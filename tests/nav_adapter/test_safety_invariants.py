@@ -121,7 +121,7 @@ def test_every_rate_is_bounded(policy: AwarenessPolicy, robot: RobotProfile, wal
             assert after.speed_limit_mps <= allowed + ROUNDING
 
 
-@settings(max_examples=40)
+@settings(max_examples=30)
 @given(
     policy=policies(),
     robot=robots(),
