@@ -8,6 +8,7 @@ from bridge_scenes import MOUNT, START_S, Robot, Seeing, odometry, tf
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from nav_adapter.ros2 import TransformBuffer
 from tracking.prediction import PredictionModel
 
 PERIOD_S = 0.05
@@ -146,3 +147,17 @@ def test_transforms_from_the_future_are_refused_and_counted() -> None:
     robot.bridge.on_transforms(tf("map", "odom", MOUNT, now_s + 1.0), now_s)
     assert robot.bridge.counts["transforms_from_future"] == 1
     assert robot.drive(now_s, 1.0)[-1].limited_by == "robot maximum"
+
+
+def test_the_buffer_forgets_moving_transforms_only() -> None:
+    buffer, here = TransformBuffer(), np.eye(4)
+    buffer.add("base_link", "camera", 0.0, here, static=True)
+    for stamp_s in (1.0, 2.0, 3.0):
+        buffer.add("odom", "base_link", stamp_s, here)
+    assert buffer.forget(after_s=3.0) == 0
+    assert buffer.forget(after_s=2.0) == 1
+    assert (buffer.lookup("odom", "camera", 2.0) == here).all()
+    assert buffer.forget() == 2
+    assert (buffer.lookup("base_link", "camera", 99.0) == here).all()
+    with pytest.raises(Exception, match="no transform between"):
+        buffer.lookup("odom", "camera", 2.0)

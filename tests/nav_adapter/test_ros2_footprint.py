@@ -73,7 +73,7 @@ class Loaded(Robot):
         return self.drive(START_S + 0.4, 0.5)[-1]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     less=st.tuples(metres, metres, metres),
     more=st.tuples(metres, metres, metres),
@@ -87,7 +87,7 @@ def test_a_larger_footprint_never_raises_the_limit(less, more, awareness) -> Non
     assert limits[2] <= limits[1] + 1e-9 <= limits[0] + 2e-9
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(longer=metres, wider=metres)
 @example(longer=0.0, wider=0.0)
 def test_an_outline_in_odom_is_that_of_the_base(longer: float, wider: float) -> None:
