@@ -69,6 +69,9 @@ def reach_rules(draw: st.DrawFn) -> ReachRules:
     )
 
 
+WITHOUT = st.sampled_from([(), (), (), SCANNER, *((each,) for each in (*SCANNER, "unseen"))])
+
+
 @st.composite
 def policies(draw: st.DrawFn) -> AwarenessPolicy:
     fresh = draw(finite(0.05, 0.3))
@@ -77,7 +80,7 @@ def policies(draw: st.DrawFn) -> AwarenessPolicy:
         inflation=draw(inflations()),
         speed=draw(human_speeds()),
         reach=draw(reach_rules()),
-        without=draw(st.sampled_from([(), (), (), SCANNER, ("reach",), ("walking on",)])),
+        without=draw(WITHOUT),
         noticed_counts_as=draw(st.none() | finite(0.0, 1.0)),
         margins=SafetyMargins(
             clearance_m=draw(finite(0.1, 0.5)),

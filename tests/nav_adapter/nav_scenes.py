@@ -19,6 +19,7 @@ from nav_adapter import (
     RobotProfile,
     RobotState,
 )
+from nav_adapter.exporters import speed_limit_at
 from nav_adapter.limit import passing_radius_m
 from perception import PersonObservation
 from perception.arrays import FloatArray
@@ -125,8 +126,11 @@ def rotation(angle_rad: float) -> FloatArray:
     return np.array([[cos, -sin], [sin, cos]])
 
 
-def moved_person(track: PersonTrack, angle_rad: float, shift_m: FloatArray) -> PersonTrack:
-    R = rotation(angle_rad)
+def moved_person(
+    track: PersonTrack, angle_rad: float, shift_m: FloatArray, *, mirrored: bool = False
+) -> PersonTrack:
+    """Return somebody in a world that is mirrored about x, turned and shifted."""
+    R = rotation(angle_rad) @ np.diag([1.0, -1.0 if mirrored else 1.0])
     both = np.kron(np.eye(2), R)
     covariance = both @ track.covariance_odom @ both.T
     return replace(
@@ -137,11 +141,15 @@ def moved_person(track: PersonTrack, angle_rad: float, shift_m: FloatArray) -> P
     )
 
 
-def moved_robot(state: RobotState, angle_rad: float, shift_m: FloatArray) -> RobotState:
+def moved_robot(
+    state: RobotState, angle_rad: float, shift_m: FloatArray, *, mirrored: bool = False
+) -> RobotState:
+    sign = -1.0 if mirrored else 1.0
     return replace(
         state,
-        position_odom_m=rotation(angle_rad) @ state.position_odom_m + shift_m,
-        heading_odom_rad=state.heading_odom_rad + angle_rad,
+        position_odom_m=rotation(angle_rad) @ (state.position_odom_m * [1.0, sign]) + shift_m,
+        heading_odom_rad=sign * state.heading_odom_rad + angle_rad,
+        yaw_rate_radps=sign * state.yaw_rate_radps,
     )
 
 
@@ -166,6 +174,19 @@ def numbers(constraints: NavConstraints) -> tuple[object, ...]:
             for o in constraints.obstacles
         ),
     )
+
+
+def field_mps(constraints: NavConstraints, state: RobotState) -> float:
+    """Return the field's limit of a robot in this state, now."""
+    limits = speed_limit_at(
+        constraints,
+        [[state.position_odom_m]],
+        [[state.heading_odom_rad]],
+        dt_s=0.1,
+        speeds_mps=[[[state.speed_mps, state.lateral_mps]]],
+        yaw_rates_radps=[[state.yaw_rate_radps]],
+    )
+    return float(limits[0, 0])
 
 
 def finite(low: float, high: float) -> st.SearchStrategy[float]:

@@ -9,10 +9,10 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import Walk, histories, policies, robots
+from nav_policies import histories, policies, robots
 from nav_scenes import ROBOT, finite, numbers, person, robot_at
 
-from nav_adapter import Alert, AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
+from nav_adapter import Alert, AwarenessPolicy, NavAdapter, NavConstraints
 from nav_adapter.policies import AttentionRules
 from tracking import PersonTrack
 
@@ -52,9 +52,7 @@ def seen(at: Places, now: float, ids: Sequence[int], lowers: Sequence[float]) ->
     order=st.permutations(range(4)),
     lowers=st.lists(st.sampled_from([0.0, 0.3, 0.9]), min_size=4, max_size=4),
 )
-def test_exchanged_ids_never_raise_the_limit_nor_lose_anybody(
-    at: Places, order: list[int], lowers: list[float]
-) -> None:
+def test_exchanged_ids_never_raise_the_limit_nor_lose_anybody(at, order, lowers) -> None:
     ids = [i for i in order if i < len(at)]
     honest, exchanging = NavAdapter(AwarenessPolicy(), ROBOT), NavAdapter(AwarenessPolicy(), ROBOT)
     for k in range(30):
@@ -100,15 +98,8 @@ def test_a_reused_id_frees_nobody(at: Places, lost_for: int, gone: str, status: 
 
 
 @FEW
-@given(
-    policy=policies(),
-    robot=robots(),
-    walk=histories(8),
-    ids=st.permutations(range(40, 80)),
-)
-def test_other_ids_change_the_ids_alone(
-    policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, ids: list[int]
-) -> None:
+@given(policy=policies(), robot=robots(), walk=histories(8), ids=st.permutations(range(40, 80)))
+def test_other_ids_change_the_ids_alone(policy, robot, walk, ids) -> None:
     one, other, now = NavAdapter(policy, robot), NavAdapter(policy, robot), 0.0
     for dt, speed_mps, _, people in walk:
         now += dt
@@ -134,9 +125,7 @@ def test_other_ids_change_the_ids_alone(
     walk=histories(8),
     calls=st.lists(st.lists(finite(0.0, 1.0), max_size=3), min_size=8, max_size=8),
 )
-def test_a_watchdog_between_updates_changes_none_of_them(
-    policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, calls: list[list[float]]
-) -> None:
+def test_a_watchdog_between_updates_changes_none_of_them(policy, robot, walk, calls) -> None:
     watched, alone, now = NavAdapter(policy, robot), NavAdapter(policy, robot), 0.0
     for (dt, speed_mps, _, people), between in zip(walk, calls, strict=False):
         for share in sorted(between):

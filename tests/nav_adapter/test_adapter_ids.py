@@ -36,21 +36,6 @@ def somebody(track_id: int, at: tuple[float, float], alpha: float, **more: float
     return person(track_id=track_id, position=at, awareness_lower=alpha, sigma_m=0.05, **more)
 
 
-def test_exchanged_ids_never_raise_the_limit_at_once() -> None:
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    before = seen(adapter, 40, somebody(1, FAR, 0.95), somebody(2, NEAR, 0.0))
-    swapped = somebody(1, NEAR, 0.95), somebody(2, FAR, 0.0)
-    after = frame(adapter, 40 * PERIOD_S, *swapped)
-    assert after.speed_limit_mps <= before.speed_limit_mps + 1e-9
-    assert [each.track_id for each in after.obstacles] == [1, 2]
-    assert [each.radius_m for each in after.obstacles] == pytest.approx([UNAWARE_M + 0.1] * 2)
-    assert [each.awareness_lower for each in after.obstacles] == [0.0, 0.0]
-    held = seen(adapter, 3, *swapped, start=41)
-    assert held.speed_limit_mps <= before.speed_limit_mps + 1e-9
-    # A tracker that goes on to call this person aware is believed after 0.2 s.
-    assert seen(adapter, 3, *swapped, start=44).speed_limit_mps > before.speed_limit_mps
-
-
 @pytest.mark.parametrize("alpha", [0.3, 0.95])
 def test_at_first_sight_awareness_raises_no_limit(alpha: float) -> None:
     adapter, blind = (NavAdapter(AwarenessPolicy(), ROBOT) for _ in range(2))
@@ -64,27 +49,14 @@ def test_at_first_sight_awareness_raises_no_limit(alpha: float) -> None:
     assert limit > lowest or alpha < 0.5
 
 
-def test_frames_of_a_tentative_track_count_as_sight() -> None:
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    tentative = replace(somebody(1, (2.5, 0.0), 0.0), status="tentative")
-    seen(adapter, 5, tentative)
-    limit = frame(adapter, 5 * PERIOD_S, somebody(1, (2.5, 0.0), 0.95)).speed_limit_mps
-    unaware = frame(
-        NavAdapter(AwarenessPolicy(), ROBOT), 0.0, somebody(1, (2.5, 0.0), 0.0)
-    ).speed_limit_mps
-    assert limit > unaware
-
-
-def test_repeated_tracks_are_no_longer_sight() -> None:
-    """Ten updates with one frame are one sighting."""
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    track = somebody(1, (2.5, 0.0), 0.95)
-    for k in range(5):
-        now = k * PERIOD_S
-        result = adapter.update((track,), robot_at(now, speed_mps=0.1), now)
-    unaware = frame(
-        NavAdapter(AwarenessPolicy(), ROBOT), 0.0, somebody(1, (2.5, 0.0), 0.0)
-    ).speed_limit_mps
+def test_frames_of_a_tentative_track_are_sight_and_repeats_of_one_frame_are_not() -> None:
+    ahead = somebody(1, (2.5, 0.0), 0.95)
+    unaware = frame(adapter(), 0.0, replace(ahead, awareness_lower=0.0)).speed_limit_mps
+    nav, repeats = adapter(), adapter()
+    seen(nav, 5, replace(ahead, status="tentative", awareness_lower=0.0))
+    assert frame(nav, 5 * PERIOD_S, ahead).speed_limit_mps > unaware
+    for now in (k * PERIOD_S for k in range(5)):
+        result = repeats.update((ahead,), robot_at(now, speed_mps=0.1), now)
     assert result.speed_limit_mps <= unaware
 
 
@@ -103,16 +75,6 @@ def test_whoever_had_a_reused_id_is_kept_for_a_second() -> None:
     assert [each.track_id for each in result.obstacles] == [1]
 
 
-def test_two_who_lose_one_id_after_the_other_are_both_kept() -> None:
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    places = [(2.0, -2.0), (2.0, 2.0), (4.0, 0.0)]
-    for k, place in enumerate(places):
-        result = frame(adapter, k * PERIOD_S, somebody(1, place, 0.0))
-    assert [each.track_id for each in result.obstacles] == [-3, -2, 1]
-    centers = {each.track_id: tuple(each.center_odom_m) for each in result.obstacles}
-    assert centers == {-2: places[0], -3: places[1], 1: places[2]}
-
-
 @given(
     speed=finite(0.0, 3.0),
     course=finite(-math.pi, math.pi),
@@ -120,9 +82,7 @@ def test_two_who_lose_one_id_after_the_other_are_both_kept() -> None:
     sigma=finite(0.0, 0.3),
     period=st.sampled_from([0.05, 0.2, 0.5]),
 )
-def test_nobody_who_walks_counts_as_new(
-    speed: float, course: float, turn: float, sigma: float, period: float
-) -> None:
+def test_nobody_who_walks_counts_as_new(speed, course, turn, sigma, period) -> None:
     """Not even somebody who stops or turns on the spot between two frames."""
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     place, shown = np.array([5.0, 0.0]), []
@@ -145,9 +105,7 @@ def test_nobody_who_walks_counts_as_new(
 
 
 @given(distance=finite(0.0, 8.0), sigma=finite(0.01, 0.3), bearing=finite(-math.pi, math.pi))
-def test_a_jump_beyond_covariance_and_human_speed_is_first_sight(
-    distance: float, sigma: float, bearing: float
-) -> None:
+def test_a_jump_beyond_covariance_and_human_speed_is_first_sight(distance, sigma, bearing) -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     moved = 4.0 + distance * math.cos(bearing), distance * math.sin(bearing)
     first = person(track_id=7, position=(4.0, 0.0), sigma_m=sigma, awareness_lower=0.9)
@@ -185,48 +143,27 @@ def test_the_reachable_limit_falls_to_zero_when_the_robots_state_repeats(dead: s
     assert result.reachable_speed_limit_mps == 0.0
 
 
-def test_a_neighbour_does_not_stand_for_somebody_whose_id_has_jumped() -> None:
+@pytest.mark.parametrize(
+    ("before", "after", "ids"),
+    [
+        ({1: (2.0, 0.0), 2: (2.0, 0.4)}, {1: (8.0, 0.0), 2: (2.0, 0.4)}, [-2, 1, 2]),
+        ({1: (2, 0.1), 2: (2, -0.1)}, {1: (8, 3), 2: (8, -3), 3: (2, 0)}, [-2, 1, 2, 3]),
+        ({1: (2.0, 0.0)}, {1: (8.0, 0.0), -7: (2.02, 0.0)}, [-2, 1]),
+    ],
+    ids=["neighbour", "one new track", "clutter"],
+)
+def test_who_stands_for_nobody_whose_id_has_jumped(before, after, ids) -> None:
+    """A neighbour for none, a new track for one, and clutter (here with a negative id) for none."""
     nav = adapter()
-
-    def neighbour(t: float) -> PersonTrack:
-        return person(t, track_id=2, position=(2, 0.4), sigma_m=0.05, awareness_lower=0.95)
-
-    for k in range(40):
-        now = k * 0.05
-        tracks = [person(now, position=(2, 0), sigma_m=0.05), neighbour(now)]
-        before = nav.update(tracks, robot_at(now, speed_mps=0.2), now)
-    tracks = [person(2.0, position=(8, 0), sigma_m=0.05), neighbour(2.0)]
-    after = nav.update(tracks, robot_at(2.0, speed_mps=0.2), 2.0)
-    assert [each.track_id for each in after.obstacles] == [-2, 1, 2]
-    assert after.speed_limit_mps <= before.speed_limit_mps + 1e-9
-
-
-def test_clutter_does_not_stand_for_somebody_whose_id_has_jumped() -> None:
-    nav = adapter()
-    for k in range(40):
-        now = k * 0.05
-        nav.update([person(now, position=(2, 0), sigma_m=0.05)], robot_at(now), now)
-    jumped = person(2.0, position=(8, 0), sigma_m=0.05)
-    clutter = person(2.0, track_id=7, position=(2.02, 0), sigma_m=0.05, status="tentative")
-    nav.update([jumped, clutter], robot_at(2.0), 2.0)
-    after = nav.update([replace(jumped, stamp_s=2.05)], robot_at(2.05), 2.05)
-    assert [each.track_id for each in after.obstacles] == [-2, 1]
-
-
-def test_one_new_track_stands_for_one_person() -> None:
-    nav = adapter()
-    places = {1: (2.0, 0.1), 2: (2.0, -0.1)}
-    for k in range(40):
-        now = k * 0.05
-        tracks = [person(now, track_id=i, position=at, sigma_m=0.1) for i, at in places.items()]
-        nav.update(tracks, robot_at(now), now)
-    tracks = [
-        person(2.0, track_id=1, position=(8, 3), sigma_m=0.1),
-        person(2.0, track_id=2, position=(8, -3), sigma_m=0.1),
-        person(2.0, track_id=3, position=(2, 0), sigma_m=0.1),
+    limit = seen(nav, 40, *(somebody(i, at, 0.0) for i, at in before.items()))
+    jumped = [
+        replace(somebody(abs(i), at, 0.0), status="tentative" if i < 0 else "confirmed")
+        for i, at in after.items()
     ]
-    after = nav.update(tracks, robot_at(2.0), 2.0)
-    assert [each.track_id for each in after.obstacles] == [-2, 1, 2, 3]
+    frame(nav, 2.0, *jumped)
+    kept = frame(nav, 2.05, *(each for each in jumped if each.status == "confirmed"))
+    assert [each.track_id for each in kept.obstacles] == ids
+    assert kept.speed_limit_mps <= limit.speed_limit_mps + 1e-9
 
 
 def test_after_a_silence_an_id_is_first_sight_for_the_speed() -> None:

@@ -85,9 +85,7 @@ def test_the_limit_rises_from_where_it_was_at_the_rate_of_the_policy() -> None:
 
 
 @given(st.floats(1.0, 7.0), st.floats(-math.pi, math.pi))
-def test_no_limit_of_a_robot_that_stands_jumps_when_somebody_is_dropped(
-    away_m: float, bearing_rad: float
-) -> None:
+def test_no_limit_of_a_robot_that_stands_jumps_when_somebody_is_dropped(away_m, bearing_rad):
     nav = NavAdapter(POLICY, ROBOT)
     place_m = away_m * np.array([math.cos(bearing_rad), math.sin(bearing_rad)])
     lowest = []
@@ -111,27 +109,6 @@ def test_somebody_lost_at_stamp_0_lets_the_limit_rise_too() -> None:
     assert limits[2] == pytest.approx(limits[0] + 0.30)
 
 
-def test_without_the_rule_the_limit_jumps() -> None:
-    results = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
-    limits = [each.speed_limit_mps for each in results]
-    assert max(after - before for before, after in pairwise(limits)) > 1.0
-    assert limits[-1] == MAXIMUM_MPS
-
-
-def test_somebody_whose_place_is_shown_empty_is_gone_at_once() -> None:
-    seen = lose(NavAdapter(POLICY, ROBOT), 0.5, place_empty=True)
-    plain = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
-    assert [numbers(one) for one in seen] == [numbers(one) for one in plain]
-
-
-def test_a_foreign_tracker_that_drops_people_at_once_has_them_held_and_then_lost() -> None:
-    results = lose(NavAdapter(POLICY, ROBOT), 4.0, coasting_s=0.0)
-    limits = [each.speed_limit_mps for each in results]
-    assert {each.obstacles == () for each in results if 1.0 < each.stamp_s < 1.95} == {False}
-    assert max(b - a for a, b in pairwise(limits)) <= RISE_MPS2 * PERIOD_S + 1e-6
-    assert results[-1].limited_by == "robot maximum"
-
-
 def test_a_robot_that_drives_away_from_a_lost_person_is_free_of_them() -> None:
     """Never slower than if the person were still held."""
     lost, held = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(0.7, hold_s=10.0), ROBOT)
@@ -149,12 +126,21 @@ def test_a_robot_that_drives_away_from_a_lost_person_is_free_of_them() -> None:
     assert freed
 
 
-def test_somebody_who_is_back_is_not_lost_any_more() -> None:
-    adapter, twin = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
-    lose(adapter, 0.2), lose(twin, 0.2)
+def test_who_is_back_or_shown_gone_or_was_lost_before_a_pause_is_not_lost_any_more() -> None:
+    """The limits are those of a policy without the rule, with which they jump."""
     back = person(4.2, position=(4.0, 0.0))
-    one, other = (each.update((back,), robot_at(4.2), 4.2) for each in (adapter, twin))
-    assert numbers(one) == numbers(other)
+    for seconds, people, now in ((0.2, (back,), 4.2), (0.0, (), 30.0)):
+        adapters = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
+        for each in adapters:
+            lose(each, seconds)
+        one, other = (each.update(people, robot_at(now), now) for each in adapters)
+        assert numbers(one) == numbers(other)
+    gone = lose(NavAdapter(POLICY, ROBOT), 0.5, place_empty=True)
+    plain = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
+    assert [numbers(one) for one in gone] == [numbers(one) for one in plain]
+    limits = [each.speed_limit_mps for each in plain]
+    assert max(after - before for before, after in pairwise(limits)) > 1.0
+    assert limits[-1] == MAXIMUM_MPS
 
 
 def test_a_track_that_was_never_more_than_tentative_is_not_lost() -> None:
@@ -163,14 +149,6 @@ def test_a_track_that_was_never_more_than_tentative_is_not_lost() -> None:
         now = step * PERIOD_S
         adapter.update((person(now, status="tentative"),), robot_at(now), now)
     assert adapter.update((), robot_at(0.3), 0.3).speed_limit_mps == MAXIMUM_MPS
-
-
-def test_after_a_pause_in_the_updates_lost_people_are_forgotten() -> None:
-    adapter, twin = NavAdapter(POLICY, ROBOT), NavAdapter(with_rise(None), ROBOT)
-    for each in (adapter, twin):
-        lose(each, 0.0)
-    one, other = (each.update((), robot_at(30.0), 30.0) for each in (adapter, twin))
-    assert numbers(one) == numbers(other)
 
 
 def test_the_people_kept_are_bounded_by_those_of_the_last_seconds() -> None:
@@ -190,11 +168,6 @@ def test_the_people_kept_are_bounded_by_those_of_the_last_seconds() -> None:
     assert len(pickle.dumps(adapter)) <= 1.1 * empty
 
 
-def test_every_preset_remembers_people_it_lost() -> None:
-    for name in ("blind", "conservative", "balanced", "assertive"):
-        assert AwarenessPolicy.preset(name).timing.lost_rise_mps2 == RISE_MPS2
-
-
 @given(
     walk=st.lists(
         st.tuples(st.sampled_from([0.05, 0.1, 0.3]), st.sets(st.integers(1, 3)), st.booleans()),
@@ -203,9 +176,7 @@ def test_every_preset_remembers_people_it_lost() -> None:
     ),
     places=st.lists(st.tuples(finite(0.8, 5.0), finite(-2.0, 2.0)), min_size=3, max_size=3),
 )
-def test_losing_people_is_between_holding_and_forgetting_them(
-    walk: list[tuple[float, set[int], bool]], places: list[tuple[float, float]]
-) -> None:
+def test_losing_people_is_between_holding_and_forgetting_them(walk, places) -> None:
     """Whoever comes and goes, where nobody moves: unaware people who stand before the robot."""
     policies = {"lost": POLICY, "forgotten": with_rise(None), "held": with_rise(0.7, hold_s=10.0)}
     adapters = {name: NavAdapter(policy, ROBOT) for name, policy in policies.items()}
@@ -227,47 +198,6 @@ def test_losing_people_is_between_holding_and_forgetting_them(
         before_mps = limits["lost"]
 
 
-def follow(place_of: Callable[[float], tuple[float, float] | None]) -> list[NavConstraints]:
-    """Return the constraints at 10 Hz for 8 s, with the real tracker, which knows its view."""
-    view = CameraView(Camera.from_fov(640, 480, math.radians(60.0)))
-    tracker = PersonTracker(TrackerConfig(awareness=POLICY.filter), view=view)
-    adapter, results = NavAdapter(POLICY, ROBOT), []
-    for step in range(80):
-        now = 0.1 * step
-        place = place_of(now)
-        seen = [] if place is None else [observed(now, place)]
-        tracks = tracker.update(seen, now, T_ODOM_CAMERA)
-        results.append(adapter.update(tracks, robot_at(now), now, perception_stamp_s=now))
-    return results
-
-
-def largest_rise_mps(results: list[NavConstraints]) -> float:
-    limits = [each.speed_limit_mps for each in results[20:]]
-    return max(after - before for before, after in pairwise(limits))
-
-
-def test_somebody_who_walks_out_of_the_view_beside_the_robot_is_lost() -> None:
-    def place(now: float) -> tuple[float, float] | None:
-        y = -1.0 + 0.8 * now
-        return (2.0, y) if y < 1.1 else None  # tan 30° of 2 m
-
-    results = follow(place)
-    lost = [each for each in results if each.limited_by == "track 1: lost"]
-    assert len(lost) >= 10
-    assert lost[0].obstacles == ()
-    assert largest_rise_mps(results) <= RISE_MPS2 * 0.1 + 1e-6
-    assert results[-1].speed_limit_mps == MAXIMUM_MPS
-
-
-def test_a_camera_that_does_not_show_somebody_any_more_proves_no_place_empty() -> None:
-    """They may be behind something that neither the map nor the tracker knows."""
-    results = follow(lambda now: (2.5, 0.0) if now < 3.0 else None)
-    lost = [each for each in results if each.limited_by == "track 1: lost"]
-    assert len(lost) >= 10
-    assert largest_rise_mps(results) <= RISE_MPS2 * 0.1 + 1e-6
-    assert results[-1].speed_limit_mps == MAXIMUM_MPS
-
-
 def ended(period_s: float, tracker: PersonTracker, **scan: Any) -> tuple[PersonTrack, ...]:
     """Show somebody for 5 s, then an empty place; return the tracks before the last one ends."""
     latest: tuple[PersonTrack, ...] = ()
@@ -285,7 +215,7 @@ def ended(period_s: float, tracker: PersonTracker, **scan: Any) -> tuple[PersonT
     pytest.fail("the track never ended")
 
 
-@pytest.mark.parametrize("period_s", [0.03, 0.1, 0.2, 0.5])
+@pytest.mark.parametrize("period_s", [0.1, 0.5])
 def test_the_tracker_tells_before_it_ends_a_track_whose_place_is_empty(period_s: float) -> None:
     walls = LaserScan(0.0, -math.pi, math.radians(0.5), np.full(720, 8.0), 0.05, 20.0)
     at_origin = Scanner.mounted(0.0, 0.0, 0.2)

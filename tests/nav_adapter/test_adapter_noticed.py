@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from nav_policies import policies, robots
 from nav_scenes import ROBOT, crowds, numbers, person, robot_at, settled_update
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
 from tracking import PersonTrack
 
 
@@ -30,14 +30,14 @@ def constraints(*tracks: PersonTrack, policy: AwarenessPolicy = NOTICED) -> NavC
     return settled_update(tracks, policy=policy)
 
 
-UNAWARE = constraints(person())
-
-
 def test_it_counts_as_that_awareness_and_never_lowers_it() -> None:
     near = person(position=(2.0, 0.0))
     aware = constraints(replace(near, awareness_lower=0.6))
     assert numbers(constraints(noticing(near))) == numbers(aware)
     assert aware.speed_limit_mps > constraints(near).speed_limit_mps + 0.2
+    for belief, lower in ((0.49, 0.0), (0.5, 0.6)):
+        (obstacle,) = constraints(noticing(near, belief)).obstacles
+        assert obstacle.awareness_lower == lower
     half = with_rule(AwarenessPolicy(), 0.4)
     assert numbers(constraints(noticing(near), policy=half)) == numbers(
         constraints(replace(near, awareness_lower=0.4), policy=half)
@@ -48,33 +48,14 @@ def test_it_counts_as_that_awareness_and_never_lowers_it() -> None:
     )
 
 
-def test_the_obstacle_says_which_bound_was_used() -> None:
-    (obstacle,) = constraints(noticing(person())).obstacles
-    assert obstacle.awareness_lower == 0.6
-
-
-@pytest.mark.parametrize("noticed", [0.0, 0.49])
-def test_a_weak_belief_counts_nothing(noticed: float) -> None:
-    assert numbers(constraints(noticing(person(), noticed))) == numbers(UNAWARE)
-
-
-def test_a_belief_of_one_half_counts() -> None:
-    (obstacle,) = constraints(noticing(person(), 0.5)).obstacles
-    assert obstacle.awareness_lower == 0.6
-
-
-@pytest.mark.parametrize("policy", ["conservative", "assertive", "blind"])
-def test_policies_without_the_rule_ignore_it(policy: str) -> None:
-    preset = with_rule(AwarenessPolicy.preset(policy), None)
-    with_belief = constraints(noticing(person()), policy=preset)
-    assert numbers(with_belief) == numbers(constraints(person(), policy=preset))
-
-
-@pytest.mark.parametrize("name", ["conservative", "blind"])
-def test_cautious_presets_have_no_memory(name: str) -> None:
-    policy = AwarenessPolicy.preset(name)
-    assert policy.noticed_counts_as is None
-    assert policy.filter.noticed_memory_s == 0.0
+@pytest.mark.parametrize("name", ["conservative", "assertive", "blind"])
+def test_policies_without_the_rule_ignore_it_and_cautious_presets_have_no_memory(name: str) -> None:
+    preset = AwarenessPolicy.preset(name)
+    without = with_rule(preset, None)
+    with_belief = constraints(noticing(person()), policy=without)
+    assert numbers(with_belief) == numbers(constraints(person(), policy=without))
+    if name != "assertive":
+        assert (preset.noticed_counts_as, preset.filter.noticed_memory_s) == (None, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -121,13 +102,7 @@ def test_at_first_sight_and_after_a_jump_the_speed_is_that_for_the_unaware() -> 
     belief=st.floats(0.0, 1.0),
     level=st.floats(0.0, 1.0),
 )
-def test_it_never_allows_more_than_that_awareness_itself(
-    policy: AwarenessPolicy,
-    robot: RobotProfile,
-    tracks: tuple[PersonTrack, ...],
-    belief: float,
-    level: float,
-) -> None:
+def test_it_never_allows_more_than_that_awareness_itself(policy, robot, tracks, belief, level):
     ruled = with_rule(policy, level)
     remembered = [noticing(track, belief) for track in tracks]
     raised = [replace(track, awareness_lower=max(track.awareness_lower, level)) for track in tracks]

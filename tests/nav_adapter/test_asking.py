@@ -214,9 +214,7 @@ def test_a_look_long_after_the_request_is_no_answer() -> None:
 
 
 @pytest.mark.parametrize(("after_s", "answers"), [(0.1, []), (0.2, []), (0.3, [0.3])])
-def test_a_look_before_anybody_could_react_is_no_answer(
-    after_s: float, answers: list[float]
-) -> None:
+def test_a_look_before_anybody_could_react_is_no_answer(after_s, answers) -> None:
     results = driven(answering(0.2 + after_s, 0.05), 2.0)
     assert [t for t, _ in requests(results)] == [0.2]
     assert [each.after_s for r in results for each in r.answers] == pytest.approx(answers)
@@ -252,16 +250,6 @@ def test_an_answer_allows_no_more_than_any_other_look(noticed: float) -> None:
     assert [numbers(each) for each in asked] == [numbers(each) for each in unasked]
 
 
-def test_nothing_is_remembered_of_somebody_who_did_not_look() -> None:
-    def believed(t_s: float) -> list[PersonTrack]:
-        (track,) = standing(BESIDE, awareness_lower=0.2)(t_s)
-        return [replace(track, noticed=0.3)]
-
-    results = driven(believed, 5.0)
-    assert requests(results)
-    assert {result.obstacles[0].awareness_lower for result in results} == {0.2}
-
-
 def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> None:
     beside = driven(standing((3.5, 1.3), (3.5, 1.9)), 2.0)
     assert [alert.track_id for _, alert in requests(beside)] == [1]
@@ -280,10 +268,7 @@ def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> 
 def test_a_neighbour_who_answered_is_not_asked_again_when_the_other_one_is() -> None:
     def pair(t_s: float) -> list[PersonTrack]:
         lower = 0.7 if 0.45 < t_s < 1.05 else 0.0
-        return [
-            _person(t_s, 1, BESIDE, awareness_lower=lower),
-            _person(t_s, 2, (3.5, 1.9)),
-        ]
+        return [_person(t_s, 1, BESIDE, awareness_lower=lower), _person(t_s, 2, (3.5, 1.9))]
 
     results = driven(pair, 20.0)
     assert [each.track_id for result in results for each in result.answers] == [1]
@@ -318,10 +303,7 @@ def histories(draw: st.DrawFn) -> list[tuple[float, float, tuple[PersonTrack, ..
             draw(st.sampled_from([1.0, 1.0, 0.4, 0.0, -0.5])),
             tuple(
                 replace(
-                    each,
-                    awareness_lower=draw(looks),
-                    noticed=draw(beliefs),
-                    time_since_seen_s=0.0,
+                    each, awareness_lower=draw(looks), noticed=draw(beliefs), time_since_seen_s=0.0
                 )
                 for each in people
             ),
@@ -332,12 +314,7 @@ def histories(draw: st.DrawFn) -> list[tuple[float, float, tuple[PersonTrack, ..
 
 @settings(max_examples=30)
 @given(walk=histories(), robot=robots(), per_minute=st.integers(1, 3), gain_s=finite(0.0, 1.0))
-def test_requests_change_no_limit_and_keep_to_their_budget(
-    walk: list[tuple[float, float, tuple[PersonTrack, ...]]],
-    robot: Any,
-    per_minute: int,
-    gain_s: float,
-) -> None:
+def test_requests_change_no_limit_and_keep_to_their_budget(walk, robot, per_minute, gain_s) -> None:
     rules = AttentionRules(min_gain_s=gain_s, per_minute=per_minute)
     asks = NavAdapter(AwarenessPolicy(attention=rules), robot)
     silent = NavAdapter(SILENT, robot)

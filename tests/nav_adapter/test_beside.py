@@ -50,9 +50,7 @@ def lowest_mps(name: str, gap_m: float, sigma_m: float = 0.05, alpha: float = 1.
 
 @pytest.mark.parametrize("sigma_m", [0.0, 0.05])
 @pytest.mark.parametrize("name", ["balanced", "assertive"])
-def test_the_robot_passes_whoever_has_noticed_it_with_the_clearance(
-    name: str, sigma_m: float
-) -> None:
+def test_the_robot_passes_whoever_has_noticed_it_with_the_clearance(name, sigma_m) -> None:
     clearance_m = AwarenessPolicy.preset(name).margins.clearance_m + 2.0 * sigma_m
     assert lowest_mps(name, clearance_m - 0.01, sigma_m) == 0.0
     assert lowest_mps(name, clearance_m + 0.002, sigma_m) >= 0.3
@@ -69,16 +67,11 @@ PRESETS = st.sampled_from(["balanced", "assertive", "conservative", "blind"])
 ALPHAS = finite(0.0, 1.0)
 
 
-@settings(max_examples=40)
-@given(
-    name=PRESETS,
-    alpha=ALPHAS,
-    sigma_m=st.sampled_from([0.0, 0.05]),
-    more_m=finite(0.001, 0.7),
-)
+@settings(max_examples=20)
+@given(name=PRESETS, alpha=ALPHAS, sigma_m=st.sampled_from([0.0, 0.05]), more_m=finite(0.001, 0.7))
 def test_a_centimetre_more_room_is_worth_a_tenth_of_a_metre_per_second_at_most(
-    name: str, alpha: float, sigma_m: float, more_m: float
-) -> None:
+    name, alpha, sigma_m, more_m
+):
     """r grows with a speed of U (1 − e^{−(t + δ)/τ}) or more, and the time of a stop with v / a.
 
     It holds for the whole way past. At one place, the limit is free at once where the robot is past
@@ -95,7 +88,7 @@ def test_a_centimetre_more_room_is_worth_a_tenth_of_a_metre_per_second_at_most(
     assert -FINEST_MPS <= far - near <= min(most_mps + FINEST_MPS, 0.1)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     name=PRESETS,
     alpha=ALPHAS,
@@ -104,9 +97,7 @@ def test_a_centimetre_more_room_is_worth_a_tenth_of_a_metre_per_second_at_most(
     more_m=finite(0.0, 0.5),
     speed_mps=finite(0.0, 1.5),
 )
-def test_more_room_is_never_slower(
-    name: str, alpha: float, along_m: float, gap_m: float, more_m: float, speed_mps: float
-) -> None:
+def test_more_room_is_never_slower(name, alpha, along_m, gap_m, more_m, speed_mps) -> None:
     near, far = (
         limit_mps(name, each, along_m, alpha=alpha, speed_mps=speed_mps)
         for each in (gap_m, gap_m + more_m)
@@ -114,16 +105,14 @@ def test_more_room_is_never_slower(
     assert near <= far + FINEST_MPS
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     name=PRESETS,
     alphas=st.tuples(ALPHAS, ALPHAS).map(sorted),
     along_m=finite(-0.8, 2.5),
     gap_m=finite(0.0, 1.0),
 )
-def test_less_awareness_and_a_robot_that_may_turn_are_slower(
-    name: str, alphas: list[float], along_m: float, gap_m: float
-) -> None:
+def test_less_awareness_and_a_robot_that_may_turn_are_slower(name, alphas, along_m, gap_m) -> None:
     less, more = (limit_mps(name, gap_m, along_m, alpha=alpha) for alpha in alphas)
     assert less <= more + 1e-9
     assert limit_mps(name, gap_m, along_m, alpha=alphas[1], keeps=False) <= more + 1e-9
@@ -137,8 +126,8 @@ def test_less_awareness_and_a_robot_that_may_turn_are_slower(
     sooner_s=finite(0.0, 1.0),
 )
 def test_reach_and_clearance_grow_with_time_and_u_and_cover_both(
-    top: float, less: float, clearance_m: float, ahead_s: float, sooner_s: float
-) -> None:
+    top, less, clearance_m, ahead_s, sooner_s
+):
     """Together they are max(C, r + λ C), which is r + C for somebody unaware."""
     margins = AwarenessPolicy().margins.model_copy(update={"clearance_m": clearance_m})
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from nav_scenes import (
     ROBOT,
@@ -36,8 +36,6 @@ from nav_adapter import (
 )
 from nav_adapter.exporters import half_planes, people_cost
 from tracking import PersonTrack
-
-NOBODY = NavConstraints(0.0, (), 1.0, "robot maximum", False)
 
 
 def constraints_of_people(tracks: tuple[PersonTrack, ...]) -> NavConstraints:
@@ -79,13 +77,6 @@ def test_all_shapes_agree(tracks: tuple[PersonTrack, ...], spacing_m: float) -> 
     assert len(perimeter) == 0
 
 
-def test_without_people_every_shape_is_empty() -> None:
-    assert circles(NOBODY).shape == (0, 5)
-    assert points(NOBODY, 0.1).shape == (0, 2)
-    assert boxes(NOBODY).shape == (0, 7)
-    assert polygons(NOBODY) == ()
-
-
 def test_copies_have_the_same_polygon() -> None:
     (obstacle,) = settled_update([person(position=(3.0, 1.0))]).obstacles
     copies = (
@@ -112,13 +103,8 @@ def gaps_m(circle: Circle, positions: np.ndarray, times_s: np.ndarray) -> np.nda
     seed=st.integers(0, 2**32 - 1),
 )
 def test_the_cost_is_the_formula_summed_over_people(
-    circles: list[Circle],
-    samples: int,
-    steps: int,
-    first_s: float,
-    robot_radius_m: float,
-    seed: int,
-) -> None:
+    circles, samples, steps, first_s, robot_radius_m, seed
+):
     positions = np.random.default_rng(seed).uniform(-6, 6, (samples, steps, 2))
     times_s = first_s + 0.2 * np.arange(steps)
     expected = np.zeros((samples, steps))
@@ -137,101 +123,6 @@ def test_the_cost_is_the_formula_summed_over_people(
         decay_m=0.5,
     )
     np.testing.assert_allclose(cost, expected, atol=1e-9)
-
-
-@given(circles=some_circles(1, 3), direction_rad=finite(-math.pi, math.pi))
-def test_cost_rises_towards_a_person_and_most_inside(
-    circles: list[Circle], direction_rad: float
-) -> None:
-    constraints = constraints_of(circles[0])
-    x, y, _, _, radius = circles[0]
-    distance_m = np.linspace(0.0, radius + 3.0, 50)
-    ray = np.array([math.cos(direction_rad), math.sin(direction_rad)])
-    cost = people_cost(constraints, ([x, y] + distance_m[:, None] * ray)[:, None], 0.1)[:, 0]
-    assert (np.diff(cost) < 0.0).all()
-    assert cost[distance_m < radius - 1e-9].min() >= 1000.0
-    assert cost[distance_m > radius + 1e-9].max() < 1.0
-
-
-def test_people_count_at_their_predicted_positions() -> None:
-    constraints = constraints_of((0.0, 5.0, 0.0, -1.0, 0.5))
-    waiting = np.zeros((1, 101, 2))
-    cost = people_cost(constraints, waiting, 0.1)[0]
-    times_s = 0.1 * np.arange(101)
-    np.testing.assert_array_equal(cost >= 1000.0, np.abs(times_s - 5.0) < 0.5 + 1e-9)
-
-
-ROBOT_RADIUS_M = 0.45
-VELOCITIES = st.tuples(finite(-2, 2), finite(-2, 2))
-
-
-def least_gap_m(circle: Circle, velocity: np.ndarray, horizon_s: float) -> float:
-    """Return the smallest gap to a robot that starts at the origin, at constant velocities."""
-    x, y, vx, vy, radius = circle
-    dvx, dvy = vx - velocity[0], vy - velocity[1]
-    square = dvx * dvx + dvy * dvy
-    nearest_s = -(x * dvx + y * dvy) / square if square > 0.0 else 0.0
-    t_s = min(max(nearest_s, 0.0), horizon_s)
-    return math.hypot(x + t_s * dvx, y + t_s * dvy) - radius - ROBOT_RADIUS_M
-
-
-@given(circles=some_circles(1, 1), velocity=VELOCITIES, tried=VELOCITIES, horizon_s=finite(0.5, 8))
-def test_an_allowed_velocity_touches_nobody_within_the_horizon(
-    circles: list[Circle],
-    velocity: tuple[float, float],
-    tried: tuple[float, float],
-    horizon_s: float,
-) -> None:
-    assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
-    ((nx, ny, bound),) = half_planes(
-        constraints_of(*circles), (0, 0), velocity, ROBOT_RADIUS_M, horizon_s=horizon_s
-    )
-    normal = np.array([nx, ny])
-    assert np.hypot(nx, ny) == pytest.approx(1.0)
-    # The tried velocity itself if it is allowed, else the nearest allowed one.
-    allowed = np.array(tried) + max(bound - normal @ tried, 0.0) * normal
-    assert least_gap_m(circles[0], allowed, horizon_s) >= -1e-6
-
-
-@given(circles=some_circles(1, 1), velocity=VELOCITIES, horizon_s=finite(0.5, 8))
-def test_the_half_plane_touches_the_velocity_obstacle(
-    circles: list[Circle], velocity: tuple[float, float], horizon_s: float
-) -> None:
-    """The boundary point nearest to the velocity just touches the person."""
-    gap_m = least_gap_m(circles[0], np.array(velocity), horizon_s)
-    assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
-    ((nx, ny, bound),) = half_planes(
-        constraints_of(*circles), (0, 0), velocity, ROBOT_RADIUS_M, horizon_s=horizon_s
-    )
-    excess_mps = nx * velocity[0] + ny * velocity[1] - bound
-    assert (excess_mps >= 0.0) == (gap_m >= 0.0) or abs(excess_mps) < 1e-6 or abs(gap_m) < 1e-6
-    grazing = np.array(velocity) - excess_mps * np.array([nx, ny])
-    assert least_gap_m(circles[0], grazing, horizon_s) == pytest.approx(0.0, abs=1e-6)
-
-
-@given(
-    angle_rad=finite(-math.pi, math.pi),
-    depth_m=finite(0.02, 1.0),
-    velocity=VELOCITIES,
-    walking=VELOCITIES,
-    resolve_s=finite(0.1, 2.0),
-)
-def test_a_robot_inside_an_obstacle_gets_out_in_time(
-    angle_rad: float,
-    depth_m: float,
-    velocity: tuple[float, float],
-    walking: tuple[float, float],
-    resolve_s: float,
-) -> None:
-    distance_m = 1.0 + ROBOT_RADIUS_M - depth_m
-    circle = (distance_m * math.cos(angle_rad), distance_m * math.sin(angle_rad), *walking, 1.0)
-    ((nx, ny, bound),) = half_planes(
-        constraints_of(circle), (0, 0), velocity, ROBOT_RADIUS_M, resolve_s=resolve_s
-    )
-    normal = np.array([nx, ny])
-    out = np.array(velocity) + max(bound - normal @ velocity, 0.0) * normal
-    apart = np.array(circle[:2]) + resolve_s * (np.array(walking) - out)
-    assert np.hypot(*apart) >= 1.0 + ROBOT_RADIUS_M - 1e-6
 
 
 def test_half_planes_agree_with_the_authors_library() -> None:

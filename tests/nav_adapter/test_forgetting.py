@@ -51,7 +51,7 @@ def limit_of(reach: Reach, turn_rad: float = 0.0) -> float:
     return lowest
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     place=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0)),
     walk=st.tuples(st.sampled_from([0.0, 0.0, 0.5, 1.0, 1.4]), st.floats(-math.pi, math.pi)),
@@ -60,12 +60,8 @@ def limit_of(reach: Reach, turn_rad: float = 0.0) -> float:
     turn_rad=st.sampled_from([0.0, 0.52]),
 )
 def test_who_keeps_to_their_motion_never_makes_a_robot_brake_harder_than_it_can(
-    place: tuple[float, float],
-    walk: tuple[float, float],
-    left_s: float,
-    share: float,
-    turn_rad: float,
-) -> None:
+    place, walk, left_s, share, turn_rad
+):
     """A robot at its limit, or at a share of it, brakes in time while memory runs out."""
     velocity = walk[0] * math.cos(walk[1]), walk[0] * math.sin(walk[1])
     now = knowing(*place, left_s, *velocity)
@@ -81,15 +77,13 @@ def test_who_keeps_to_their_motion_never_makes_a_robot_brake_harder_than_it_can(
     assert limit_of(later, turn_rad) >= share * before - BRAKING_MPS2 * CYCLE_S - SLACK_MPS
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     place=st.tuples(st.floats(-1.0, 5.0), st.floats(-2.0, 2.0)),
     velocity=st.tuples(st.floats(-1.4, 1.4), st.floats(-1.4, 1.4)),
     left_s=st.tuples(LEFT_S, LEFT_S),
 )
-def test_more_memory_is_never_slower_and_none_is_no_awareness(
-    place: tuple[float, float], velocity: tuple[float, float], left_s: tuple[float, float]
-) -> None:
+def test_more_memory_is_never_slower_and_none_is_no_awareness(place, velocity, left_s) -> None:
     some, more = (limit_of(knowing(*place, each, *velocity)) for each in sorted(left_s))
     none = limit_of(knowing(*place, 0.0, *velocity).at_least(UNAWARE_MPS))
     for_good = limit_of(knowing(*place, math.inf, *velocity))
@@ -144,7 +138,7 @@ def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
         assert then - 0.02 <= field[0, 0] <= then + 1e-3
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     place=st.tuples(st.floats(1.0, 5.0), st.floats(-2.0, 2.0)),
     left_s=st.floats(AVERTED_LEFT_S, 3.5),
@@ -153,8 +147,8 @@ def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
     lower=st.floats(0.6, 1.0),
 )
 def test_a_face_that_looks_away_makes_no_robot_brake_harder_than_it_can(
-    place: tuple[float, float], left_s: float, braking_mps2: float, share: float, lower: float
-) -> None:
+    place, left_s, braking_mps2, share, lower
+):
     """Also one that takes longer to stop than a face that looks away leaves."""
     robot = replace(ROBOT, max_deceleration_mps2=braking_mps2)
     adapter = NavAdapter(POLICY, robot)
@@ -179,12 +173,7 @@ def test_a_face_that_looks_away_makes_no_robot_brake_harder_than_it_can(
     later_s=st.floats(0.0, 0.2),
     place=st.tuples(st.floats(1.0, 3.0), st.floats(-1.0, 1.0)),
 )
-def test_a_track_without_a_newer_frame_knows_nothing_better(
-    left_s: tuple[float, float],
-    departed_mps: tuple[float, float],
-    later_s: float,
-    place: tuple[float, float],
-) -> None:
+def test_a_track_without_a_newer_frame_knows_nothing_better(left_s, departed_mps, later_s, place):
     """Whatever it says of memory and motion: no frame shows either."""
     adapter = NavAdapter(POLICY, ROBOT)
 
@@ -200,7 +189,7 @@ def test_a_track_without_a_newer_frame_knows_nothing_better(
     assert after.speed_limit_mps <= before.speed_limit_mps + 1e-6
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     ahead_m=st.floats(8.0, 12.0),
     beside_m=st.floats(-1.6, 1.6),
@@ -209,8 +198,8 @@ def test_a_track_without_a_newer_frame_knows_nothing_better(
     knows_s=st.one_of(st.just(math.inf), st.floats(1.5, 5.0)),
 )
 def test_a_robot_at_its_limit_brakes_in_time_beside_people_who_walk_past(
-    ahead_m: float, beside_m: float, walking_mps: float, braking_mps2: float, knows_s: float
-) -> None:
+    ahead_m, beside_m, walking_mps, braking_mps2, knows_s
+):
     """Whether they go on looking or their look ends on the way."""
     robot = replace(ROBOT, max_deceleration_mps2=braking_mps2)
     adapter = NavAdapter(POLICY, robot)
@@ -232,15 +221,13 @@ def test_a_robot_at_its_limit_brakes_in_time_beside_people_who_walk_past(
         driven_m += speed_mps * CYCLE_S
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     walk=st.tuples(st.floats(0.12, 1.4), st.floats(-math.pi, math.pi)),
     place=st.tuples(st.floats(0.8, 4.0), st.floats(-1.6, 1.6)),
     preset=st.sampled_from(["balanced", "assertive"]),
 )
-def test_who_walks_as_fast_as_their_awareness_lets_them_sets_no_step(
-    walk: tuple[float, float], place: tuple[float, float], preset: str
-) -> None:
+def test_who_walks_as_fast_as_their_awareness_lets_them_sets_no_step(walk, place, preset) -> None:
     """The limit does not rise as their awareness falls a little."""
     policy = AwarenessPolicy.preset(preset)
     low, high = 0.0, 1.0

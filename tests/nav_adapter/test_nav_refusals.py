@@ -112,6 +112,8 @@ SPEEDS: list[tuple[str, float, str]] = [
     ("min_turning_radius_m", 1500.0, "at most 100 m, got 1500 m; is it in millimetres"),
 ]
 
+SEPARATION = {"deceleration_mps2": 0.0, "reaction_time_s": 0.3, "clearance_m": 0.1}
+
 #: Calls, and what is said of their arguments.
 CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: NavAdapter({}, ROBOT), "policy must be an AwarenessPolicy, got dict"),
@@ -120,19 +122,10 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
         lambda: NavAdapter(AwarenessPolicy(), ROBOT, prediction="prediction.yaml"),
         "prediction must be a PredictionModel or None, got str",
     ),
-    (
-        lambda: adapted(inflation=Own(lambda _: math.nan)),
-        r"Own.radius_m\(0\) must be finite, got nan",
-    ),
-    (
-        lambda: adapted(inflation=Own(lambda a: 2.0 + a)),
-        "Own must not grow with awareness, got 2 m",
-    ),
+    (lambda: adapted(inflation=Own(lambda _: math.nan)), r"radius_m\(0\) must be finite, got nan"),
+    (lambda: adapted(inflation=Own(lambda a: 2.0 + a)), "not grow with awareness, got 2 m"),
     (lambda: adapted(inflation=Own(lambda a: math.inf if a else 1.0)), "must be finite, got inf"),
-    (
-        lambda: adapted(speed=Own(speed=-0.1)),
-        r"Own.human_speed_mps\(0\) must lie in \[0, inf\), got -0.1",
-    ),
+    (lambda: adapted(speed=Own(speed=-0.1)), r"human_speed_mps\(0\) must lie in .*, got -0.1"),
     (lambda: adapted(speed=Own(speed=None)), "must be a number, got NoneType"),
     (lambda: adapted().watchdog(10**400), "stamp_s"),
     (lambda: RobotState(10**400, np.zeros(2), 0.0, 0.0, 0.0), "stamp_s"),
@@ -140,10 +133,7 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: replace(robot_at(), velocity_base_mps=np.array([0.5, 0.2])), "first number of velo"),
     (lambda: replace(robot_at(), velocity_base_mps=np.array([0.0, math.nan])), "must be finite"),
     (lambda: replace(robot_at(), velocity_base_mps=np.zeros(3)), "velocity_base_mps"),
-    (
-        lambda: replace(ROBOT, drive="tracked"),
-        "drive must be 'differential', 'ackermann', 'holonomic'",
-    ),
+    (lambda: replace(ROBOT, drive="tracked"), "drive must be 'differential', 'ackermann', 'h"),
     *(
         (lambda outline=outline: replace(ROBOT, footprint_m=outline), f"^footprint_m must .*{text}")
         for outline, text in OUTLINES
@@ -152,30 +142,18 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
         (lambda name=name, value=value: replace(STEERS, **{name: value}), f"{name} must be {text}")
         for name, value, text in SPEEDS
     ),
-    *(
-        (lambda name=name, value=value: replace(ROBOT, **{name: value}), name)
-        for name in ("max_yaw_rate_radps", "max_yaw_acceleration_radps2")
-        for value in (0.0, -1.0, math.inf)
-    ),
+    (lambda: replace(ROBOT, max_yaw_rate_radps=0.0), "max_yaw_rate_radps"),
+    (lambda: replace(ROBOT, max_yaw_acceleration_radps2=math.inf), "max_yaw_acceleration_radps2"),
     (lambda: replace(STEERS, min_turning_radius_m=None), "min_turning_radius_m must"),
     (lambda: replace(STEERS, drive="differential"), "min_turning_radius_m must"),
     (lambda: replace(STEERS, drive=None), "min_turning_radius_m must"),
     (lambda: replace(STEERS, brakes_on_curve=1), "brakes_on_curve must be True or False"),
     (lambda: replace(STEERS, min_turning_radius_m=0.0), "min_turning_radius_m must"),
     (lambda: replace(STEERS, min_turning_radius_m=math.inf), "min_turning_radius_m must"),
-    (
-        lambda: Alert(1, "siren", 1.0, 0.0, ""),
-        "kind must be one of light, voice, horn, attention, got",
-    ),
+    (lambda: Alert(1, "siren", 1.0, 0.0, ""), "kind must be one of light, voice, horn, attent"),
     (lambda: Alert(1, "horn", -1.0, 0.0, ""), "time_to_closest_s must lie in"),
-    (
-        lambda: Alert(1, "attention", 1.0, 0.0, ""),
-        "means must be light, voice, horn with kind 'attention'",
-    ),
-    (
-        lambda: Alert(1, "horn", 1.0, 0.0, "", means="light"),
-        "means must be horn with kind 'horn', got 'light'",
-    ),
+    (lambda: Alert(1, "attention", 1.0, 0.0, ""), "means must be light, voice, horn with kind"),
+    (lambda: Alert(1, "horn", 1.0, 0.0, "", means="light"), "means must be horn .*, got 'light'"),
     (lambda: Alert(1, "attention", 1.0, 0.0, "", means="voice", wins_s=-1.0), "wins_s must lie in"),
     (lambda: painted(costmap=np.zeros((5, 5))), "uint8 array of shape .H, W., got float64"),
     (lambda: painted(costmap=np.zeros((5, 5, 1), dtype=np.uint8)), r"got uint8 of shape \(5, 5, 1"),
@@ -212,10 +190,7 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     ),
     (lambda: predicted_circles(ONE, [0.0], slots=2), "slots needs robot_position_odom_m"),
     (lambda: predicted_circles(SETTLED, [0.0], model=FITTED, sigmas=-1.0), "sigmas"),
-    (
-        lambda: predicted_circles(ONE, [0.0], model=FITTED),
-        r"obstacles\[0\] has covariance_odom=None",
-    ),
+    (lambda: predicted_circles(ONE, [0.0], model=FITTED), r"\[0\] has covariance_odom=None"),
     (lambda: replace(CIRCLE, covariance_odom=-np.eye(4)), "covariance_odom"),
     (lambda: planes(position_odom_m=(0.0, math.nan)), "position_odom_m must be finite"),
     (lambda: planes(velocity_odom_mps=(0.0,)), r"velocity_odom_mps must have shape \(2,\)"),
@@ -255,19 +230,12 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: control_point(robot_at(), -1.0), "ahead_m"),
     *(
         (
-            lambda a=a: max_speed_mps(
-                3.0, 1.6, deceleration_mps2=a, reaction_time_s=0.3, clearance_m=0.1
-            ),
-            "deceleration_mps2 must be > 0 m/s²",
+            lambda a=a: max_speed_mps(3, 1.6, **(SEPARATION | {"deceleration_mps2": a})),
+            "must be > 0 m",
         )
         for a in (0.0, -1.0, math.nan)
     ),
-    (
-        lambda: protective_separation_m(
-            1.0, 1.6, deceleration_mps2=0.0, reaction_time_s=0.3, clearance_m=0.1
-        ),
-        "deceleration_mps2",
-    ),
+    (lambda: protective_separation_m(1.0, 1.6, **SEPARATION), "deceleration_mps2"),
 ]
 
 

@@ -10,10 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from limit_worlds import drawn_robot
-from nav_scenes import ROBOT, finite, moved_person, moved_robot, person, robot_at, settled_update
+from nav_scenes import ROBOT, field_mps, finite, person, robot_at, settled_update
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
-from nav_adapter.exporters import speed_limit_at
+from nav_adapter import AwarenessPolicy, NavAdapter, RobotProfile, RobotState
 from nav_adapter.motion import clip_twists, clip_twists_ahead, twist_envelope
 from nav_adapter.rigid import Motion
 from nav_adapter.rules import CREEPING_MPS
@@ -22,8 +21,7 @@ from tracking import PersonTrack
 
 POLICY = AwarenessPolicy.preset("balanced")
 DIFFERENTIAL = replace(ROBOT, drive="differential")
-STATES = [300, pytest.param(1000, marks=pytest.mark.full)]
-MIRROR = np.diag([1.0, -1.0])
+STATES = [120, pytest.param(1000, marks=pytest.mark.full)]
 
 
 def drawn_state(rng: np.random.Generator, robot: RobotProfile) -> RobotState:
@@ -50,19 +48,6 @@ def drawn_people(
             )
         )
     return found
-
-
-def field_mps(constraints: NavConstraints, state: RobotState) -> float:
-    """Return the field's limit of a robot in this state, now."""
-    limits = speed_limit_at(
-        constraints,
-        [[state.position_odom_m]],
-        [[state.heading_odom_rad]],
-        dt_s=0.1,
-        speeds_mps=[[[state.speed_mps, state.lateral_mps]]],
-        yaw_rates_radps=[[state.yaw_rate_radps]],
-    )
-    return float(limits[0, 0])
 
 
 @pytest.mark.parametrize("count", STATES, ids=str)
@@ -117,7 +102,7 @@ def meets_on_an_arc(
     return False
 
 
-@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.full)], ids=str)
+@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.full)], ids=str)
 def test_within_the_limit_no_arc_meets_a_reach(count: int) -> None:
     rng, limited = np.random.default_rng(4), 0
     for index in range(count):
@@ -130,48 +115,6 @@ def test_within_the_limit_no_arc_meets_a_reach(count: int) -> None:
         if speed_mps > 0.01:
             assert not meets_on_an_arc(robot, state, track, speed_mps), index
     assert limited > count // 10
-
-
-@given(
-    seed=st.integers(0, 10**6),
-    angle=finite(-math.pi, math.pi),
-    shift=st.tuples(finite(-20.0, 20.0), finite(-20.0, 20.0)),
-    mirrored=st.booleans(),
-)
-@settings(max_examples=60)
-def test_a_turned_mirrored_or_shifted_world_has_the_same_limits(
-    seed: int, angle: float, shift: tuple[float, float], mirrored: bool
-) -> None:
-    rng, offset = np.random.default_rng(seed), np.array(shift)
-    state = drawn_state(rng, DIFFERENTIAL)
-    if seed % 4 == 0:
-        state = replace(state, speed_mps=0.0)
-    people = drawn_people(rng, 2, state.position_odom_m, 1.5)
-    here = settled_update(people, policy=POLICY, robot=DIFFERENTIAL, state=state)
-    field = field_mps(here, state)
-    if mirrored:
-        both = np.kron(np.eye(2), MIRROR)
-        people = [
-            replace(
-                each,
-                position_odom_m=MIRROR @ each.position_odom_m,
-                velocity_odom_mps=MIRROR @ each.velocity_odom_mps,
-                covariance_odom=both @ each.covariance_odom @ both,
-            )
-            for each in people
-        ]
-        state = replace(
-            state,
-            position_odom_m=MIRROR @ state.position_odom_m,
-            heading_odom_rad=-state.heading_odom_rad,
-            yaw_rate_radps=-state.yaw_rate_radps,
-        )
-    people = [moved_person(each, angle, offset) for each in people]
-    state = moved_robot(state, angle, offset)
-    there = settled_update(people, policy=POLICY, robot=DIFFERENTIAL, state=state)
-    for name in ("speed_limit_mps", "fastest_point_limit_mps", "other_way_limit_mps"):
-        assert getattr(there, name) == pytest.approx(getattr(here, name), abs=1e-3), name
-    assert field_mps(there, state) == pytest.approx(field, abs=5e-3)
 
 
 def ahead_alone(bearing_rad: float, half_rad: float) -> float | None:
@@ -202,9 +145,7 @@ def test_a_robot_creeps_where_no_sensor_sees(speed: float, left: float, limit: f
 
 
 @pytest.mark.parametrize("clock_s", [0.0, 1000.0])
-def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(
-    clock_s: float,
-) -> None:
+def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(clock_s) -> None:
     def seen(bearing_rad: float, half_rad: float) -> float | None:
         return None if ahead_alone(bearing_rad, half_rad) is None else clock_s
 
@@ -227,9 +168,7 @@ def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(
     v=finite(-1.5, 1.5),
     w=finite(-2.0, 2.0),
 )
-def test_twists_of_the_envelope_are_not_clipped(
-    seed: int, speed: float, v: float, w: float
-) -> None:
+def test_twists_of_the_envelope_are_not_clipped(seed, speed, v, w) -> None:
     rng = np.random.default_rng(seed)
     state = robot_at(speed_mps=speed)
     people = drawn_people(rng, 2, state.position_odom_m, 1.0)

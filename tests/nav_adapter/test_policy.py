@@ -30,9 +30,7 @@ class Constant:
 
 
 @given(policy=policies(), low=ALPHA, high=ALPHA)
-def test_radius_and_human_speed_never_grow_with_awareness(
-    policy: AwarenessPolicy, low: float, high: float
-) -> None:
+def test_radius_and_human_speed_never_grow_with_awareness(policy, low, high) -> None:
     low, high = sorted((low, high))
     rounding = 1e-12
     assert policy.inflation.radius_m(high) <= policy.inflation.radius_m(low) + rounding
@@ -40,9 +38,7 @@ def test_radius_and_human_speed_never_grow_with_awareness(
 
 
 @given(inflation=inflations(), speed=human_speeds())
-def test_both_ends_are_reached_exactly(
-    inflation: InterpolatedInflation, speed: InterpolatedHumanSpeed
-) -> None:
+def test_both_ends_are_reached_exactly(inflation, speed) -> None:
     for alpha in (0.0, inflation.unaware_below, float("nan")):
         assert inflation.radius_m(alpha) == inflation.unaware_radius_m
     for alpha in (0.0, speed.unaware_below, float("nan")):
@@ -65,9 +61,7 @@ def test_the_ramp_in_closed_form() -> None:
 
 
 @given(policy=policies())
-def test_a_policy_is_the_same_after_yaml(
-    policy: AwarenessPolicy, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_a_policy_is_the_same_after_yaml(policy, tmp_path_factory) -> None:
     path = tmp_path_factory.mktemp("policy") / "policy.yaml"
     policy.to_yaml(path)
     assert AwarenessPolicy.from_yaml(path) == policy

@@ -39,9 +39,7 @@ def policy_row(name: str) -> list[list[float]]:
 
 
 @pytest.mark.parametrize(("column", "name"), list(enumerate(PRESETS)))
-def test_the_table_of_presets_shows_what_the_command_prints(
-    column: int, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_table_of_presets_shows_what_the_command_prints(column, name, capsys) -> None:
     assert main(["policy", "show", name, "--json", "--out", "none"]) == 0
     table = json.loads(capsys.readouterr().out)[name]
     policy = AwarenessPolicy.preset(name)

@@ -8,16 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_scenes import (
-    ROBOT,
-    Circle,
-    constraints_of,
-    crowds,
-    finite,
-    person,
-    robot_at,
-    some_circles,
-)
+from nav_scenes import ROBOT, constraints_of, crowds, finite, person, robot_at, some_circles
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
 from nav_adapter.exporters import predicted_circles, speed_limit_at
@@ -26,9 +17,7 @@ from tracking.prediction import FITTED, PredictionModel, predict_ahead
 
 
 @given(circles=some_circles(), growth_mps=finite(0, 1), steps=st.integers(0, 5))
-def test_predicted_circles_move_and_grow(
-    circles: list[Circle], growth_mps: float, steps: int
-) -> None:
+def test_predicted_circles_move_and_grow(circles, growth_mps, steps) -> None:
     times_s = 0.3 * np.arange(steps)
     rows = predicted_circles(constraints_of(*circles), times_s, growth_mps=growth_mps)
     assert rows.shape == (len(circles), steps, 5)
@@ -41,9 +30,7 @@ def test_predicted_circles_move_and_grow(
 
 
 @given(circles=some_circles(0, 6), slots=st.integers(1, 5))
-def test_slots_hold_the_nearest_people_and_then_empty_circles(
-    circles: list[Circle], slots: int
-) -> None:
+def test_slots_hold_the_nearest_people_and_then_empty_circles(circles, slots) -> None:
     times_s = np.array([0.0, 0.5, 1.0])
     robot = np.array([1.0, -2.0])
     constraints = constraints_of(*circles)

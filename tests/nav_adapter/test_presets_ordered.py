@@ -11,15 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_policies import Walk, driven, histories, robots
-from nav_scenes import (
-    ROBOT,
-    finite,
-    person,
-    policy_radius_m,
-    robot_at,
-    rotation,
-    settled_update,
-)
+from nav_scenes import ROBOT, finite, person, policy_radius_m, robot_at, rotation, settled_update
 
 from nav_adapter import AwarenessPolicy, RobotProfile
 from nav_adapter.limit import passing_radius_m
@@ -38,7 +30,7 @@ ORDERED = (
 ROUNDING = 1e-9
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(robot=st.just(ROBOT) | robots(), walk=histories(12))
 def test_presets_are_ordered_at_every_instant(robot: RobotProfile, walk: Walk) -> None:
     results = {name: driven(AwarenessPolicy.preset(name), robot, walk) for name in PRESETS}
@@ -119,9 +111,7 @@ def passing_mps(
     course_rad=finite(-math.pi, math.pi),
     side=st.sampled_from([1.0, -1.0]),
 )
-def test_beside_the_circle_of_anybody_the_robot_may_drive(
-    name: str, alpha: float, along_m: float, course_rad: float, side: float
-) -> None:
+def test_beside_the_circle_of_anybody_the_robot_may_drive(name, alpha, along_m, course_rad, side):
     """For every awareness, course and place along the edge."""
     policy = AwarenessPolicy.preset(name)
     assert passing_mps(policy, alpha, along_m, course_rad, side) >= PASSING_MPS - 0.02

@@ -34,8 +34,8 @@ def test_each_point_moves_with_its_own_velocity(motion: Motion, ahead: float, le
 
 @given(speeds, speeds, st.floats(0.1, 2.0), st.floats(0.0, 1.0))
 def test_in_its_stopping_time_a_body_moves_as_far_as_until_it_has_braked(
-    forward: float, rate: float, radius_m: float, reaction_s: float
-) -> None:
+    forward, rate, radius_m, reaction_s
+):
     braking = reaction_s, 0.8, radius_m
     driving, turning = Motion(0.0, 0.0, 0.0, forward), Motion(0.0, 0.0, yaw_rate_radps=rate)
     for motion, fastest in ((driving, abs(forward)), (turning, abs(rate) * radius_m)):

@@ -5,17 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from bridge_scenes import (
-    FRONT,
-    INFO,
-    MOUNT,
-    START_S,
-    Robot,
-    attentive,
-    image,
-    nobody,
-    odometry,
-)
+from bridge_scenes import INFO, MOUNT, START_S, Robot, attentive, image, nobody, odometry
 from nav_scenes import ROBOT
 
 from nav_adapter import AwarenessPolicy, NavConstraints
@@ -123,15 +113,6 @@ def test_one_picture_that_is_sent_twice_costs_nothing() -> None:
             robot.silent.clear()
         limits.append(robot.drive(START_S + 1.0 + PERIOD_S, 1.0)[-1].speed_limit_mps)
     assert limits[1] == pytest.approx(limits[0], abs=0.05)
-
-
-def test_beside_scanners_a_black_camera_makes_everybody_unaware() -> None:
-    robot = BlindedRobot(FRONT, people=[(3.2, -0.2)], make_pipeline=attentive)
-    robot.drive(START_S, 2.0)
-    robot.picture = BLACK
-    blind = robot.drive(START_S + 2.0, 2.0)[-1]
-    assert max(each.awareness_lower for each in blind.obstacles) == 0.0
-    assert any("camera has been silent" in warning for warning in robot.warnings)
 
 
 class Simulated(Robot):

@@ -64,9 +64,7 @@ def shape(polygon) -> Polygon:
 
 
 @given(finite(0.0, 1e6), finite(0.02, 10.0), st.booleans())
-def test_a_speed_limit_is_never_read_as_no_limit_or_above_the_maximum(
-    limit: float, maximum: float, percentage: bool
-) -> None:
+def test_a_speed_limit_is_never_read_as_no_limit_or_above_the_maximum(limit, maximum, percentage):
     message = speed_limit(limited(limit), maximum, percentage=percentage)
     # The limit that a controller with this maximum reads.
     meant = message.speed_limit * (maximum / 100.0 if percentage else 1.0)
@@ -119,9 +117,7 @@ def test_every_person_has_a_polygon_and_the_stop_polygon_comes_last(tracks) -> N
 
 
 @given(finite(0.0, 1.5))
-def test_the_stop_polygon_is_in_the_footprint_exactly_when_the_limit_cannot_be_sent(
-    limit: float,
-) -> None:
+def test_the_stop_polygon_is_in_the_footprint_exactly_when_the_limit_cannot_be_sent(limit) -> None:
     (stop,) = collision_polygons(limited(limit), ROBOT, None, base_frame="base")
     drawn = shape(stop.polygon.polygon)
     assert stop.header.frame_id == "base"
@@ -235,9 +231,7 @@ ALERTS = st.builds(
 
 @settings(max_examples=40)
 @given(st.lists(ALERTS, max_size=4), st.booleans(), st.booleans())
-def test_alerts_follow_the_state_of_the_limit_as_warnings(
-    given_alerts: list[Alert], stale: bool, suffices: bool
-) -> None:
+def test_alerts_follow_the_state_of_the_limit_as_warnings(given_alerts, stale, suffices) -> None:
     constraints = replace(
         limited(0.25), alerts=tuple(given_alerts), stale=stale, braking_suffices=suffices
     )
@@ -278,10 +272,7 @@ def test_requests_and_answers_are_no_fault_and_follow_the_warnings(means: str) -
         ("awarenav: answer", DiagnosticStatus.OK)
     ] * 2
     told = [{each.key: each.value for each in status.values} for status in answers]
-    assert told == [
-        {"track_id": "4", "after_s": "0.900"},
-        {"track_id": "7", "after_s": "1.250"},
-    ]
+    assert told == [{"track_id": "4", "after_s": "0.900"}, {"track_id": "7", "after_s": "1.250"}]
 
 
 MPPI_RADPS = 1.9
@@ -326,8 +317,8 @@ shares = st.sampled_from([-1.0, 0.0, 1.0]) | finite(-1.0, 1.0)
 
 @given(robots, finite(0.02, 3.0), shares, shares, shares, st.booleans())
 def test_no_point_is_faster_than_the_limit_under_an_obedient_controller(
-    robot: RobotProfile, limit: float, x: float, y: float, yaw_rate: float, percentage: bool
-) -> None:
+    robot, limit, x, y, yaw_rate, percentage
+):
     constraints = NavConstraints(0.0, (), limit, "a test", False, robot=robot)
     message = speed_limit(constraints, robot.max_speed_mps, percentage=percentage)
     sent_mps = message.speed_limit * (robot.max_speed_mps / 100.0 if percentage else 1.0)
@@ -367,8 +358,8 @@ def test_where_nobody_is_the_robot_keeps_its_own_maximum(drive: str | None) -> N
 
 @given(st.floats(0.1, 1.5), st.floats(-1.5, 1.5), st.floats(0.05, 1.4), st.floats(0.0, 1.0))
 def test_on_its_curve_no_point_of_a_robot_that_keeps_it_is_faster_than_the_limit(
-    speed_mps: float, yaw_rate_radps: float, limit_mps: float, slower: float
-) -> None:
+    speed_mps, yaw_rate_radps, limit_mps, slower
+):
     curve = replace(ROBOT, brakes_on_curve=True, drive="differential", max_yaw_rate_radps=1.5)
     state = RobotState(5.0, [0.0, 0.0], 0.0, speed_mps, yaw_rate_radps)
     constraints = replace(limited(limit_mps), robot=curve)

@@ -73,15 +73,13 @@ class Loaded(Robot):
         return self.drive(START_S + 0.4, 0.5)[-1]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     less=st.tuples(metres, metres, metres),
     more=st.tuples(metres, metres, metres),
     awareness=st.sampled_from([0.0, 0.95, None]),
 )
-def test_a_larger_footprint_never_raises_the_limit(
-    less: tuple[float, ...], more: tuple[float, ...], awareness: float | None
-) -> None:
+def test_a_larger_footprint_never_raises_the_limit(less, more, awareness) -> None:
     limits = [
         Loaded(awareness).with_load(outline(*sizes)).speed_limit_mps
         for sizes in ((0.0, 0.0, 0.0), less, tuple(np.add(less, more)))
@@ -89,7 +87,7 @@ def test_a_larger_footprint_never_raises_the_limit(
     assert limits[2] <= limits[1] + 1e-9 <= limits[0] + 2e-9
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(longer=metres, wider=metres)
 @example(longer=0.0, wider=0.0)
 def test_an_outline_in_odom_is_that_of_the_base(longer: float, wider: float) -> None:
@@ -152,9 +150,7 @@ def test_a_smaller_outline_does_not_shrink_the_robot() -> None:
         (outline(), "odom", 4.0, "holds 0.1 s longer"),
     ],
 )
-def test_a_footprint_that_is_refused_keeps_the_last_and_says_so(
-    corners: np.ndarray, frame: str, late_s: float, words: str
-) -> None:
+def test_a_footprint_that_is_refused_keeps_the_last_and_says_so(corners, frame, late_s, words):
     nav = Loaded()
     before = nav.with_load(outline(front=0.8))
     now_s = START_S + 0.9

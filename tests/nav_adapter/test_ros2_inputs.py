@@ -18,13 +18,7 @@ from scipy.spatial.transform import Rotation
 from awarenav import AwarenavError
 from awarenav.estimate._pictures import as_rgb
 from nav_adapter import NavError
-from nav_adapter.ros2 import (
-    CameraMount,
-    TransformBuffer,
-    is_rectified,
-    optical_problem,
-    picture_of,
-)
+from nav_adapter.ros2 import CameraMount, TransformBuffer, is_rectified, optical_problem, picture_of
 from nav_adapter.ros2.conversions import pose_matrix, to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import Point, Quaternion
 from nav_adapter.ros2.messages.sensor_msgs import CompressedImage, Image, RegionOfInterest
@@ -102,9 +96,7 @@ def test_the_orientation_in_an_image_file_is_ignored() -> None:
         ("bayer_grbg8", "GR", "BG"),
     ],
 )
-def test_bayer_patterns_give_the_colour_of_the_sensor(
-    encoding: str, first: str, second: str
-) -> None:
+def test_bayer_patterns_give_the_colour_of_the_sensor(encoding, first, second) -> None:
     mosaic = np.zeros((16, 16, 1), np.uint8)
     for row, letters in enumerate((first, second)):
         for column, letter in enumerate(letters):
@@ -162,8 +154,8 @@ def test_lookups_compose_and_invert(first, second, third) -> None:
 
 @given(poses, poses, poses, finite(-1.0, 1.0))
 def test_between_two_stamps_a_frame_moves_at_constant_velocity_in_itself(
-    start, seen_from, mount, share: float
-) -> None:
+    start, seen_from, mount, share
+):
     """It is the same motion from whichever frame it is seen, and of whichever point of the body."""
     step = pose_matrix(Point(0.3, -0.2, 0.1), yaw_quaternion(share))
     lookups = []
@@ -349,9 +341,8 @@ def test_images_in_a_body_frame_are_refused_with_both_frames(turn, frame) -> Non
 
 
 @pytest.mark.parametrize("frame", ["camera", "camera_link", "camera_optical_frame"])
-@pytest.mark.parametrize("roll_deg", [0.0, 90.0, 180.0, -90.0, 5.0])
-@pytest.mark.parametrize("down_deg", [0.0, 30.0, -25.0])
-@pytest.mark.parametrize("yaw_deg", [0.0, 120.0])
+@pytest.mark.parametrize("roll_deg", [90.0, 180.0, 5.0])
+@pytest.mark.parametrize(("yaw_deg", "down_deg"), [(0.0, 30.0), (120.0, -25.0)])
 def test_cameras_may_be_upside_down_or_upright(frame, roll_deg, down_deg, yaw_deg) -> None:
     nav = mounted(turned(yaw_deg, down_deg, roll_deg) * OPTICAL, frame)
     assert seen_from(nav, frame), nav.warnings

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import pytest
 from bridge_scenes import INFO, PATIENCE_S, Network, image, odometry
 from paths import ROOT
-from ros2_scenes import everything, plain, typestore
+from ros2_scenes import everything, plain
 from scan_scenes import scan_message
 
 from nav_adapter import NavError
@@ -28,7 +28,6 @@ from perception import PerceptionError
 from tracking import TrackingError
 from tracking.prediction import PredictionModel
 
-STORE = typestore()
 MESSAGES = [*everything(), ("odom", Odometry())]
 no_ros = pytest.mark.skipif(
     importlib.util.find_spec("rclpy") is not None, reason="ROS is installed here"
@@ -159,8 +158,8 @@ def two_scanners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_node_reads_scanners_and_a_map_and_publishes_the_speed_mask(
-    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    node_module, two_scanners, monkeypatch
+):
     for name, value in (("use_map", True), ("speed_mask_hz", 2.0)):
         monkeypatch.setitem(StandInNode.parameters, name, value)
     ros_node = node_module.AwarenessNode()
@@ -197,17 +196,15 @@ def test_the_node_reads_scanners_and_a_map_and_publishes_the_speed_mask(
         ({}, "networks have seen renders only"),
     ],
 )
-def test_the_node_refuses_sensors_that_make_no_sense(
-    node_module: Any, monkeypatch: pytest.MonkeyPatch, parameters: dict, text: str
-) -> None:
+def test_the_node_refuses_sensors_that_make_no_sense(node_module, monkeypatch, parameters, text):
     monkeypatch.setattr(StandInNode, "parameters", parameters)
     with pytest.raises((NavError, PerceptionError), match=text):
         node_module.AwarenessNode()
 
 
 def test_the_node_takes_a_calibrated_prediction_or_refuses_the_file(
-    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+    node_module, two_scanners, monkeypatch, tmp_path
+):
     path = tmp_path / "prediction.yaml"
     monkeypatch.setitem(StandInNode.parameters, "prediction_file", str(path))
     with pytest.raises(TrackingError, match=r"prediction\.yaml"):

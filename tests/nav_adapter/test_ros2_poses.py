@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -41,8 +40,7 @@ motions = st.builds(
 def message(stamp_s: float, motion: Motion) -> Odometry:
     pose = Pose(Point(motion.x_m, motion.y_m, 0.0), yaw_quaternion(motion.heading_rad))
     twist = Twist(
-        Vector3(motion.forward_mps, motion.left_mps, 0.0),
-        Vector3(0.0, 0.0, motion.yaw_rate_radps),
+        Vector3(motion.forward_mps, motion.left_mps, 0.0), Vector3(0.0, 0.0, motion.yaw_rate_radps)
     )
     return Odometry(
         header(stamp_s, "odom"), "base_link", PoseWithCovariance(pose), TwistWithCovariance(twist)
@@ -60,11 +58,7 @@ def told(motion: Motion, *after_s: float) -> RobotPoses:
 
 
 def pose_of(motion: Motion) -> np.ndarray:
-    cos, sin = math.cos(motion.heading_rad), math.sin(motion.heading_rad)
-    T = np.eye(4)
-    T[:2, :2] = [[cos, -sin], [sin, cos]]
-    T[:2, 3] = motion.x_m, motion.y_m
-    return T
+    return planar(motion.x_m, motion.y_m, motion.heading_rad)
 
 
 def seen(**changes: Any) -> PersonObservation:

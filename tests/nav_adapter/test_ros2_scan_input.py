@@ -18,19 +18,11 @@ from bridge_scenes import (
     scanning,
     tf,
 )
-from scan_scenes import RAYS, planar, ranges_of, scan_message
+from scan_scenes import planar, ranges_of, scan_message
 from scipy.spatial.transform import Rotation
 
 from nav_adapter.ros2 import ScannerInput, ScannerMount
-from nav_adapter.ros2.conversions import yaw_quaternion
-from nav_adapter.ros2.messages.geometry_msgs import (
-    Point,
-    Pose,
-    Quaternion,
-    Twist,
-    TwistWithCovariance,
-    Vector3,
-)
+from nav_adapter.ros2.messages.geometry_msgs import Point, Pose, Quaternion
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
 from nav_adapter.ros2.messages.std_msgs import Header
 from perception.laser import MapCells
@@ -55,44 +47,6 @@ def test_the_place_of_a_scanner_comes_from_tf(upside_down: bool) -> None:
         assert nav.bridge.on_scan(0, scan_message(now, [place], T_odom_scanner), now)
     (track,) = nav.bridge.tracks
     assert np.linalg.norm(track.position_odom_m - place) < 0.1
-
-
-@pytest.mark.parametrize("late_s", [0.0, 0.07], ids=["odometry in time", "odometry late"])
-def test_people_stand_still_while_the_robot_drives_and_turns(late_s: float) -> None:
-    speed, yaw_rate = 1.0, 0.8
-    mount = SCANNER_MOUNT.T_base_scanner()
-
-    def pose(stamp_s: float) -> np.ndarray:
-        yaw = yaw_rate * (stamp_s - START_S)
-        along = speed / yaw_rate
-        return planar(along * math.sin(yaw) - 1.0, along * (1.0 - math.cos(yaw)), yaw)
-
-    def moving(stamp_s: float):
-        T, yaw = pose(stamp_s), yaw_rate * (stamp_s - START_S)
-        twist = Twist(Vector3(speed, 0.0, 0.0), Vector3(0.0, 0.0, yaw_rate))
-        still = odometry(stamp_s, yaw=yaw)
-        place = replace(still.pose, pose=Pose(Point(T[0, 3], T[1, 3], 0.0), yaw_quaternion(yaw)))
-        return replace(still, pose=place, twist=TwistWithCovariance(twist))
-
-    nav = Listener(scanners=[FRONT], with_camera=False)
-    step_s = 0.04 / RAYS
-    for tick in range(8):
-        nav.bridge.on_odometry(moving(START_S + 0.02 * tick))
-    errors, sent_s = [], START_S + 0.14
-    for tick in range(5, 40):
-        first_s = START_S + PERIOD_S * tick
-        now = first_s + 0.04
-        while sent_s + 0.02 <= now - late_s:
-            sent_s += 0.02
-            nav.bridge.on_odometry(moving(sent_s), now)
-        poses = [pose(first_s + step_s * ray) @ mount for ray in range(RAYS)]
-        message = scan_message(first_s, [PERSON], poses=poses, time_increment_s=step_s)
-        assert nav.bridge.on_scan(0, message, now)
-        if tick > 15:
-            (track,) = nav.bridge.tracks
-            errors.append(np.linalg.norm(track.position_odom_m - PERSON))
-    # It is 7 mm; 56 mm if the sweep counts as one instant, 168 mm if late odometry stands still.
-    assert max(errors) < 0.02
 
 
 NOW = START_S + 1.0

@@ -34,9 +34,7 @@ def drive(seconds: float) -> list[tuple[NavConstraints, RobotState]]:
 
 
 def sent(
-    stream: SpeedMaskStream,
-    updates: Sequence[tuple[NavConstraints, RobotState | None]],
-    *keys: str,
+    stream: SpeedMaskStream, updates: Sequence[tuple[NavConstraints, RobotState | None]], *keys: str
 ) -> list[tuple[float, str, Any]]:
     """Return stamp, key and message of what the stream sends."""
     wanted = keys or (MASK, INFO_KEY)

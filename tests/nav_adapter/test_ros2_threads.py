@@ -137,9 +137,7 @@ def test_publishing_goes_on_while_a_network_hangs_until_the_robot_stops() -> Non
         assert not nav.tick(START_S + 2.05).stale
 
 
-def test_an_error_in_perception_is_seen_and_publishing_goes_on(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_an_error_in_perception_is_seen_and_publishing_goes_on(caplog) -> None:
     with threaded() as nav, caplog.at_level(logging.ERROR, logger="nav_adapter"):
         nav.network.problem = RuntimeError("out of memory")
         for tick in range(1, 40):
@@ -207,9 +205,7 @@ def test_the_clock_may_be_set_while_an_image_is_processed() -> None:
         assert nav.tick(START_S - 98.0).limited_by == "robot maximum"
 
 
-def test_an_error_of_the_adapter_stops_the_robot_and_publishing_goes_on(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_error_of_the_adapter_stops_the_robot_and_publishing_goes_on(monkeypatch, caplog):
     with threaded() as nav, caplog.at_level(logging.ERROR, logger="nav_adapter"):
         adapter = nav.bridge._adapter
 

@@ -11,16 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
 
-from nav_adapter import (
-    AwarenessPolicy,
-    NavAdapter,
-    NavConstraints,
-    RobotProfile,
-    RobotState,
-)
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from nav_adapter.motion import clip_twists, control_point, differential_drive, twist_envelope
 from perception.arrays import FloatArray
-from tracking import PersonTrack
 
 ROUNDING = 1e-9
 TURNS = replace(ROBOT, max_yaw_rate_radps=1.2, max_yaw_acceleration_radps2=3.0)
@@ -45,9 +38,7 @@ def fastest_point_mps(robot: RobotProfile, vx: float, vy: float, yaw_rate: float
 
 
 @given(robot=ROBOTS, limit_mps=finite(0.0, 1.5), share=finite(-1.0, 1.0), turn=finite(-1.0, 1.0))
-def test_no_point_of_a_robot_within_the_yaw_limit_is_too_fast(
-    robot: RobotProfile, limit_mps: float, share: float, turn: float
-) -> None:
+def test_no_point_of_a_robot_within_the_yaw_limit_is_too_fast(robot, limit_mps, share, turn):
     constraints = limited(limit_mps, robot)
     speed = share * limit_mps
     most = constraints.yaw_rate_limit_radps(speed)
@@ -75,9 +66,7 @@ def test_where_nobody_limits_the_robot_it_turns_at_full_speed() -> None:
 
 @settings(max_examples=40)
 @given(tracks=crowds())
-def test_people_limit_the_fastest_point_as_they_limit_the_speed(
-    tracks: tuple[PersonTrack, ...],
-) -> None:
+def test_people_limit_the_fastest_point_as_they_limit_the_speed(tracks) -> None:
     """Against a robot that is half as fast again, whose own maximum limits nobody nearer."""
     policy = AwarenessPolicy()
     mine = NavAdapter(policy, ROBOT).update(tracks, robot_at(), 0.0)
@@ -112,9 +101,7 @@ def test_old_data_and_recovery_limit_the_fastest_point_too() -> None:
     v=finite(-2.0, 2.0),
     w=finite(-3.0, 3.0),
 )
-def test_the_envelope_is_where_both_limits_hold(
-    robot: RobotProfile, limit_mps: float, more_mps: float, v: float, w: float
-) -> None:
+def test_the_envelope_is_where_both_limits_hold(robot, limit_mps, more_mps, v, w) -> None:
     constraints = limited(limit_mps, robot, limit_mps + more_mps)
     rows = twist_envelope(constraints)
     slack = (rows[:, :2] @ [v, w] - rows[:, 2]).min()
@@ -129,9 +116,7 @@ def test_the_envelope_is_where_both_limits_hold(
     more_mps=st.sampled_from([0.0, 0.5, math.inf]),
     twist=st.tuples(finite(-2, 2), finite(-2, 2), finite(-3, 3)),
 )
-def test_clipped_twists_keep_their_curve_and_the_limits(
-    robot: RobotProfile, limit_mps: float, more_mps: float, twist: tuple[float, float, float]
-) -> None:
+def test_clipped_twists_keep_their_curve_and_the_limits(robot, limit_mps, more_mps, twist) -> None:
     constraints = limited(limit_mps, robot, limit_mps + more_mps)
     for wanted in (np.array(twist), np.array([twist[0], twist[2]])):
         clipped = clip_twists(constraints, wanted)
@@ -188,9 +173,7 @@ def test_the_yaw_limit_is_the_curve_and_the_fastest_point(limit_mps: float, spee
 
 
 @given(limit_mps=finite(0.1, 1.5), v=finite(-2.0, 2.0), w=finite(-1.5, 1.5), backward=st.booleans())
-def test_each_cone_of_the_envelope_is_the_twists_of_its_direction(
-    limit_mps: float, v: float, w: float, backward: bool
-) -> None:
+def test_each_cone_of_the_envelope_is_the_twists_of_its_direction(limit_mps, v, w, backward):
     constraints = limited(limit_mps, STEERS)
     rows = twist_envelope(constraints, backward=backward)
     assert (rows[:, 2] <= 0.0).all()  # standing is in both
@@ -223,13 +206,7 @@ def test_clipped_twists_can_be_driven(limit_mps: float, twist: tuple[float, floa
     limit_mps=st.none() | finite(0.0, 1.5),
     dt_s=st.none() | finite(0.02, 0.2),
 )
-def test_a_velocity_becomes_a_curve_that_can_be_driven(
-    velocity: tuple[float, float],
-    speed: float,
-    turn: float,
-    limit_mps: float | None,
-    dt_s: float | None,
-) -> None:
+def test_a_velocity_becomes_a_curve_that_can_be_driven(velocity, speed, turn, limit_mps, dt_s):
     state = RobotState(0.0, np.zeros(2), 0.0, speed, turn * min(tightest_radps(speed), 0.8))
     constraints = None if limit_mps is None else limited(limit_mps, STEERS)
     v, w = differential_drive(velocity, state, STEERS, constraints=constraints, dt_s=dt_s)
@@ -265,9 +242,7 @@ def moves_at(state: RobotState, command: tuple[float, float], ahead_m: float) ->
 
 
 @given(state=STATES, velocity=VELOCITIES, ahead_m=finite(0.2, 1.0))
-def test_the_point_ahead_moves_as_wanted(
-    state: RobotState, velocity: tuple[float, float], ahead_m: float
-) -> None:
+def test_the_point_ahead_moves_as_wanted(state, velocity, ahead_m) -> None:
     heading = np.array([math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)])
     command = differential_drive(velocity, state, UNLIMITED, ahead_m=ahead_m)
     assert command[0] >= 0.0
@@ -291,9 +266,7 @@ def test_there_and_back(state: RobotState, ahead_m: float) -> None:
 
 
 @given(state=STATES, velocity=VELOCITIES, limit_mps=finite(0.0, 1.5))
-def test_limits_slow_the_point_and_keep_its_direction(
-    state: RobotState, velocity: tuple[float, float], limit_mps: float
-) -> None:
+def test_limits_slow_the_point_and_keep_its_direction(state, velocity, limit_mps) -> None:
     constraints = limited(limit_mps, TURNS)
     free = np.array(differential_drive(velocity, state, UNLIMITED))
     speed, yaw_rate = differential_drive(velocity, state, TURNS, constraints=constraints)
@@ -303,9 +276,7 @@ def test_limits_slow_the_point_and_keep_its_direction(
 
 
 @given(state=STATES, velocity=VELOCITIES, limit_mps=finite(0.0, 1.5), dt_s=finite(0.02, 0.2))
-def test_with_a_period_the_command_can_be_reached(
-    state: RobotState, velocity: tuple[float, float], limit_mps: float, dt_s: float
-) -> None:
+def test_with_a_period_the_command_can_be_reached(state, velocity, limit_mps, dt_s) -> None:
     constraints = limited(limit_mps, TURNS)
     speed, yaw_rate = differential_drive(velocity, state, TURNS, constraints=constraints, dt_s=dt_s)
     assert abs(speed - state.speed_mps) <= dt_s + ROUNDING
@@ -335,9 +306,7 @@ def drive(
 
 @pytest.mark.parametrize("robot", [ROBOT, TURNS])
 @pytest.mark.parametrize("behind_rad", [0.0, 1.0, 2.5, math.pi, -math.pi + 1e-9, -1.6])
-def test_the_robot_turns_to_the_velocity_and_keeps_it(
-    robot: RobotProfile, behind_rad: float
-) -> None:
+def test_the_robot_turns_to_the_velocity_and_keeps_it(robot, behind_rad) -> None:
     velocity = (0.8 * math.cos(0.7), 0.8 * math.sin(0.7))
     start = RobotState(0.0, (0.0, 0.0), 0.7 + behind_rad, 0.0, 0.0)
     states = drive(start, velocity, robot, 12.0)

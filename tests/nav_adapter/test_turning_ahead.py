@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, SCANNER, crowds, finite, person, robot_at, settled_update
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
 from nav_adapter.motion import clip_twists, clip_twists_ahead, twist_envelope
 from perception.arrays import FloatArray
 from tracking import PersonTrack
@@ -36,9 +36,7 @@ def limited(limit_mps: float, fastest_mps: float) -> NavConstraints:
     less_mps=st.tuples(finite(0.0, 0.3), finite(0.0, 0.3)),
     twist=TWISTS,
 )
-def test_slack_is_left_below_the_limit_of_the_fastest_point(
-    limit_mps: float, more_mps: float, less_mps: tuple[float, float], twist: tuple[float, ...]
-) -> None:
+def test_slack_is_left_below_the_limit_of_the_fastest_point(limit_mps, more_mps, less_mps, twist):
     constraints = limited(limit_mps, limit_mps + more_mps)
     rows, radius_m = twist_envelope(constraints), TURNS.circumscribed_radius_m
     small, large = sorted(less_mps)
@@ -68,12 +66,7 @@ def driving(draw: st.DrawFn) -> RobotState:
 
 @settings(max_examples=30)
 @given(tracks=crowds(), state=driving(), twist=TWISTS, less_mps=st.tuples(*2 * [finite(0.0, 0.3)]))
-def test_looking_ahead_never_makes_a_twist_faster(
-    tracks: tuple[PersonTrack, ...],
-    state: RobotState,
-    twist: tuple[float, ...],
-    less_mps: tuple[float, float],
-) -> None:
+def test_looking_ahead_never_makes_a_twist_faster(tracks, state, twist, less_mps) -> None:
     constraints = settled_update(tracks, state=state, robot=TURNS)
     wanted, (small, large) = np.array(twist), sorted(less_mps)
 
@@ -96,7 +89,7 @@ def test_looking_ahead_never_makes_a_twist_faster(
     np.testing.assert_allclose(flatter, 0.0, atol=ROUNDING)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     tracks=crowds(),
     state=driving(),
@@ -107,14 +100,8 @@ def test_looking_ahead_never_makes_a_twist_faster(
     policy=st.sampled_from([AwarenessPolicy(), AwarenessPolicy(without=SCANNER)]),
 )
 def test_a_twist_alone_is_slowed_down_exactly_as_in_a_row_of_twists(
-    tracks: tuple[PersonTrack, ...],
-    state: RobotState,
-    twist: tuple[float, ...],
-    away_m: float,
-    robot: RobotProfile,
-    slack_mps: float,
-    policy: AwarenessPolicy,
-) -> None:
+    tracks, state, twist, away_m, robot, slack_mps, policy
+):
     # A single twist is computed on plain floats, a row by the field, in single precision.
     farther = tuple(
         replace(track, position_odom_m=track.position_odom_m * (1.0 + away_m)) for track in tracks
@@ -149,9 +136,7 @@ def walked(track: PersonTrack, time_s: float) -> PersonTrack:
 
 @settings(max_examples=30)
 @given(tracks=crowds(), state=driving(), twist=TWISTS, sideways=st.booleans())
-def test_a_twist_that_is_held_keeps_the_limits_of_the_next_cycles(
-    tracks: tuple[PersonTrack, ...], state: RobotState, twist: tuple[float, ...], sideways: bool
-) -> None:
+def test_a_twist_that_is_held_keeps_the_limits_of_the_next_cycles(tracks, state, twist, sideways):
     wanted = np.array(twist if sideways else [twist[0], twist[2]])
     adapter = NavAdapter(AwarenessPolicy(), TURNS)
     for ago_s in (0.3, 0.2, 0.1, 0.0):
@@ -172,9 +157,7 @@ def test_a_twist_that_is_held_keeps_the_limits_of_the_next_cycles(
 
 @settings(max_examples=20)
 @given(tracks=crowds(), state=driving(), turning=finite(-1.2, 1.2))
-def test_a_robot_that_is_still_too_fast_turns_less(
-    tracks: tuple[PersonTrack, ...], state: RobotState, turning: float
-) -> None:
+def test_a_robot_that_is_still_too_fast_turns_less(tracks, state, turning) -> None:
     constraints = settled_update(tracks, state=state, robot=TURNS)
     assert constraints.fastest_point_limit_mps is not None
     command = clip_twists_ahead(constraints, state, [0.0, turning], CYCLE_S, slack_mps=0.0)

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from tracking_scenes import FloatArray, camera_at, observe
+from tracking_scenes import FloatArray, camera_at, nearest, observe
 
 from perception import Camera, PersonObservation
 from tracking import (
+    AwarenessFilterConfig,
     CameraView,
     PersonTrack,
     PersonTracker,
@@ -22,6 +23,8 @@ from tracking import (
 LASER = "laser"
 CAMERA_STD_M = (0.25, 0.06)  # along the ray and across it
 LASER_STD_M = 0.05
+MEMORY_S = 4.0
+REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=MEMORY_S))
 
 Event = tuple[float, list[PersonObservation], FloatArray, str]
 
@@ -144,3 +147,51 @@ def play(tracker: PersonTracker, events: Sequence[Event]) -> tuple[PersonTrack, 
     for stamp_s, people, T, sensor in events:
         tracks = tracker.update(people, stamp_s, T, sensor=sensor)
     return tracks
+
+
+class Scene:
+    """A robot with camera and scanner before one person; time goes on with :meth:`run`."""
+
+    def __init__(self, tracker: PersonTracker | None = None, *, seed: int = 0) -> None:
+        self.tracker = both(REMEMBERS) if tracker is None else tracker
+        self.rng = np.random.default_rng(seed)
+        self.tick = 0
+        self.place: FloatArray = np.array([3.0, 0.5])
+        self.tracks: tuple[PersonTrack, ...] = ()
+
+    @property
+    def now(self) -> float:
+        return 0.02 * self.tick
+
+    def run(
+        self,
+        duration_s: float,
+        *,
+        alpha: float | None = None,
+        camera: bool = True,
+        laser: bool = True,
+        velocity: tuple[float, float] = (0.0, 0.0),
+        others: tuple[tuple[float, float], ...] = (),
+        until: Callable[[PersonTrack], bool] | None = None,
+    ) -> PersonTrack:
+        """Advance; the camera sees the person or not, with α or without a usable face."""
+        for _ in range(round(duration_s / 0.02)):
+            self.tick += 1
+            self.place = self.place + 0.02 * np.asarray(velocity)
+            noise = 0.7 * self.rng.normal(size=(2, 2))
+            if self.tick % 5 == 0:
+                seen = [seen_by_camera(self.place, self.now, noise_m=noise[0], awareness=alpha)]
+                self.tracks = self.tracker.update(seen if camera else [], self.now, camera_at())
+            if self.tick % 2 == 0:
+                places = [self.place + 0.05 * noise[1], *others]
+                scan = [seen_by_laser(place, self.now) for place in places]
+                self.tracks = self.tracker.update(
+                    scan if laser else scan[1:], self.now, laser_at(), sensor=LASER
+                )
+            if until is not None and until(self.track):
+                break
+        return self.track
+
+    @property
+    def track(self) -> PersonTrack:
+        return nearest(self.tracks, self.place)

@@ -19,11 +19,7 @@ from tracking._sensors import sensors_of
 from tracking._state import Field, State, Step
 from tracking.clock import FrameClock
 
-CONFIG = TrackerConfig(
-    gate_probability=0.99,
-    gate_distance_m=0.9,
-    miss_cost=4.0,
-)
+CONFIG = TrackerConfig(gate_probability=0.99, gate_distance_m=0.9, miss_cost=4.0)
 SENSORS = sensors_of(CONFIG, None, None)
 GATE2 = -2.0 * math.log(0.01)
 

@@ -15,7 +15,6 @@ from tracking import AwarenessFilterConfig
 from tracking.awareness_filter import (
     PRIOR,
     AwarenessBelief,
-    Evidence,
     drift,
     drift_unseen,
     estimate,
@@ -49,28 +48,8 @@ beliefs = st.builds(
 )
 
 
-@given(belief=beliefs, dt_s=st.floats(1e-4, 20.0), share=st.floats(0.0, 1.0))
-def test_drift_is_exact_in_time(belief: AwarenessBelief, dt_s: float, share: float) -> None:
-    once = drift(belief, dt_s, TAU_S, CONFIG)
-    middle = drift(belief, share * dt_s, TAU_S, CONFIG)
-    twice = drift(middle, dt_s - share * dt_s, TAU_S, CONFIG)
-    assert twice.mean == pytest.approx(once.mean, abs=1e-9)
-    assert twice.variance == pytest.approx(once.variance, abs=1e-9)
-    assert twice.bound == pytest.approx(once.bound, abs=1e-9)
-
-
-@given(belief=beliefs, dt_s=st.floats(0.0, 20.0))
-def test_the_bound_never_rises_without_evidence(belief: AwarenessBelief, dt_s: float) -> None:
-    after = drift(belief, dt_s, TAU_S, CONFIG)
-    assert after.bound <= belief.bound
-    assert estimate(after).awareness_lower <= estimate(belief).awareness_lower
-    assert forget(after, CONFIG).bound <= after.bound
-
-
 @given(belief=beliefs, dt_s=st.floats(1e-3, 5.0))
-def test_the_bound_falls_to_the_lowest_value_during_the_step(
-    belief: AwarenessBelief, dt_s: float
-) -> None:
+def test_the_bound_falls_to_the_lowest_value_during_the_step(belief, dt_s) -> None:
     phi = np.exp(-np.linspace(0.0, dt_s, 4001) / TAU_S)
     m0 = logit(PRIOR_AWARENESS)
     path = (
@@ -82,12 +61,11 @@ def test_the_bound_falls_to_the_lowest_value_during_the_step(
     after = drift(belief, dt_s, TAU_S, CONFIG).bound
     assert after <= lowest + 1e-9
     assert after == pytest.approx(lowest, abs=1e-3)
+    assert forget(belief, CONFIG).bound <= belief.bound
 
 
 @given(belief=beliefs, dt_s=intervals)
-def test_a_hidden_face_lowers_the_bound_at_least_as_fast_as_being_unseen(
-    belief: AwarenessBelief, dt_s: float
-) -> None:
+def test_a_hidden_face_lowers_the_bound_at_least_as_fast_as_being_unseen(belief, dt_s) -> None:
     no_face = drift(belief, dt_s, CONFIG.no_face_time_constant_s, CONFIG)
     unseen = drift(belief, dt_s, CONFIG.unseen_time_constant_s, CONFIG)
     assert no_face.bound <= unseen.bound + 1e-12
@@ -101,9 +79,7 @@ def test_without_evidence_the_belief_ends_at_the_prior(belief: AwarenessBelief) 
 
 
 @given(belief=beliefs, alpha=alphas, std=stds, dt_s=intervals)
-def test_a_measurement_is_a_scalar_bayes_update(
-    belief: AwarenessBelief, alpha: float, std: float, dt_s: float
-) -> None:
+def test_a_measurement_is_a_scalar_bayes_update(belief, alpha, std, dt_s) -> None:
     measured = evidence(alpha, std)
     assert measured is not None
     mean, variance = measured
@@ -158,34 +134,16 @@ def test_an_alpha_with_a_large_standard_deviation_is_no_evidence() -> None:
     assert evidence(None, None) is None
 
 
-@pytest.mark.parametrize("frames", [2, 40])
-def test_information_per_second_does_not_depend_on_the_frame_rate(frames: int) -> None:
-    span_s = CORRELATION_S
-    once = measure(PRIOR, Evidence(1.0, 0.5), span_s, CONFIG)
-    many = PRIOR
-    for _ in range(frames):
-        many = measure(many, Evidence(1.0, 0.5), span_s / frames, CONFIG)
-    assert many.mean == pytest.approx(once.mean)
-    assert many.variance == pytest.approx(once.variance)
-
-
-@given(
-    mean=st.floats(-12.0, 12.0),
-    variance=st.floats(1e-4, 25.0),
-)
-def test_an_estimate_is_a_probability_with_a_bounded_deviation(
-    mean: float, variance: float
-) -> None:
+@given(mean=st.floats(-12.0, 12.0), variance=st.floats(1e-4, 25.0))
+def test_an_estimate_is_a_probability_with_a_bounded_deviation(mean, variance) -> None:
     result = estimate(AwarenessBelief(mean, variance, mean - Z * math.sqrt(variance)))
     assert 0.0 <= result.awareness_lower <= result.awareness <= 1.0
     assert 0.0 <= result.awareness_std <= 0.5
 
 
-@pytest.mark.parametrize("mean", [-4.0, -1.0, 0.0, 2.5])
-@pytest.mark.parametrize("variance", [0.05, 0.5, 2.25, 4.0])
-def test_the_deviation_is_that_of_the_logit_normal_distribution(
-    mean: float, variance: float
-) -> None:
+@pytest.mark.parametrize("mean", [-4.0, 0.0, 2.5])
+@pytest.mark.parametrize("variance", [0.05, 2.25])
+def test_the_deviation_is_that_of_the_logit_normal_distribution(mean, variance) -> None:
     std = math.sqrt(variance)
 
     def moment(order: int) -> float:
@@ -218,9 +176,7 @@ periods = st.floats(0.02, 1.0) | st.just(math.inf)
 
 
 @given(belief=beliefs, age_s=ages, step_s=ages, period_s=periods)
-def test_the_bound_never_rises_while_unseen(
-    belief: AwarenessBelief, age_s: float, step_s: float, period_s: float
-) -> None:
+def test_the_bound_never_rises_while_unseen(belief, age_s, step_s, period_s) -> None:
     after = drift_unseen(belief, 0.0, step_s, -age_s, period_s, CONFIG)
     assert after.bound <= belief.bound
     assert estimate(after).awareness_lower <= estimate(belief).awareness_lower
@@ -232,9 +188,7 @@ def test_the_bound_never_rises_while_unseen(
 
 
 @given(belief=beliefs, age_s=ages, step_s=ages, share=st.floats(0.0, 1.0), period_s=periods)
-def test_drift_while_unseen_is_exact_in_time(
-    belief: AwarenessBelief, age_s: float, step_s: float, share: float, period_s: float
-) -> None:
+def test_drift_while_unseen_is_exact_in_time(belief, age_s, step_s, share, period_s) -> None:
     middle_s = share * step_s
     once = drift_unseen(belief, 0.0, step_s, -age_s, period_s, CONFIG)
     middle = drift_unseen(belief, 0.0, middle_s, -age_s, period_s, CONFIG)

@@ -40,9 +40,7 @@ def after(*stamps_s: float) -> JumpedClock:
         ([5.0, 4.4], (4.4, 4.4, 1)),
     ],
 )
-def test_which_stamps_follow_one_another(
-    stamps_s: list[float], expected: tuple[float, float, int]
-) -> None:
+def test_which_stamps_follow_one_another(stamps_s, expected) -> None:
     clock = after(*stamps_s)
     assert (clock.first_s, clock.last_s, clock.stamps) == expected
 

@@ -6,24 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from fusion_scenes import (
-    LASER,
-    Rig,
-    both,
-    laser_at,
-    play,
-    seen_by_camera,
-    seen_by_laser,
-)
+from fusion_scenes import LASER, REMEMBERS, Rig, both, laser_at, play, seen_by_camera, seen_by_laser
 from tracking_scenes import as_bytes, camera_at, nearest
 
 from perception import Camera
 from tracking import (
-    AwarenessFilterConfig,
     CameraView,
     PersonTracker,
     ScannerView,
-    TrackerConfig,
     TrackingError,
 )
 
@@ -36,12 +26,9 @@ def walks(x_m: float, y_m: float, vx: float, vy: float):
     return lambda now: (x_m + vx * now, y_m + vy * now)
 
 
-@pytest.mark.parametrize("ratio", [1.4, 1.7])
-@pytest.mark.parametrize("range_m", [2.0, 4.5])
+@pytest.mark.parametrize(("ratio", "range_m"), [(1.4, 4.5), (1.7, 2.0)])
 @pytest.mark.parametrize("first", ["camera", "laser", "together"])
-def test_a_child_or_somebody_seated_is_one_track_in_the_right_place(
-    ratio: float, range_m: float, first: str
-) -> None:
+def test_a_child_or_somebody_seated_is_one_track_in_the_right_place(ratio, range_m, first) -> None:
     place = (range_m, 0.3 * range_m)
     start = {"camera": (0.0, 2.0), "laser": (2.0, 0.0), "together": (0.0, 0.0)}[first]
     rig = Rig([stands(*place)], ratios=[ratio], seed=int(10 * ratio))
@@ -149,14 +136,6 @@ def test_identity_is_kept_through_the_blind_side_of_the_camera() -> None:
     assert [len(found) for found in ids.values()] == [1, 1, 1]
 
 
-def test_people_whom_only_the_scanner_sees_are_confirmed_and_unaware() -> None:
-    tracker = both()
-    (track,) = play(tracker, Rig([stands(-3.0, 1.0)]).events(2.0))
-    assert track.status == "confirmed"
-    assert track.awareness_lower == 0.0
-    assert np.linalg.norm(track.position_odom_m - (-3.0, 1.0)) < 0.1
-
-
 def test_scans_neither_prove_nor_take_awareness() -> None:
     look = lambda _person, _now: 0.9  # noqa: E731
     rig = Rig([stands(4.0)], faces=look, seed=3, detection=(1.0, 1.0))
@@ -197,9 +176,7 @@ def test_the_silence_of_a_sensor_that_never_spoke_is_infinite() -> None:
 
 @pytest.mark.parametrize("place", [(3.0, 0.5), (-2.0, 0.0)])
 @pytest.mark.parametrize("scanner_ends_s", [1.0, 3.0])
-def test_nobody_is_forgotten_sooner_than_with_the_camera_alone(
-    place: tuple[float, float], scanner_ends_s: float
-) -> None:
+def test_nobody_is_forgotten_sooner_than_with_the_camera_alone(place, scanner_ends_s) -> None:
     # The person vanishes from the camera at 3 s, from the scanner before; both go on.
     camera_sees = lambda _p: True  # noqa: E731
     rig = Rig([stands(*place)], camera_sees=camera_sees, seed=8)
@@ -236,9 +213,7 @@ def test_a_scan_without_a_person_is_a_miss_for_the_scanner_only() -> None:
     ("camera_s", "laser_s", "camera_latency_s", "laser_latency_s"),
     [(0.033, 0.025, 0.0, 0.0), (0.1, 0.08, 0.25, 0.01), (0.2, 0.1, 0.4, 0.05), (0.05, 0.1, 0, 0.2)],
 )
-def test_rates_and_latencies_do_not_matter(
-    camera_s: float, laser_s: float, camera_latency_s: float, laser_latency_s: float
-) -> None:
+def test_rates_and_latencies_do_not_matter(camera_s, laser_s, camera_latency_s, laser_latency_s):
     people = [walks(5.0, -2.0, -0.5, 0.7), stands(4.0, 1.5)]
     look = lambda person, _now: 0.9 if person else None  # noqa: E731
     rig = Rig(
@@ -250,8 +225,7 @@ def test_rates_and_latencies_do_not_matter(
         laser_latency_s=laser_latency_s,
     )
     events = rig.events(4.0)
-    config = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=4.0))
-    tracker, in_order = both(config), both(config)
+    tracker, in_order = both(REMEMBERS), both(REMEMBERS)
     tracks = play(tracker, events)
     assert as_bytes(tracks) == as_bytes(play(in_order, sorted(events, key=lambda e: e[0])))
     assert tracker.refused_late_frames == 0

@@ -25,7 +25,6 @@ from tracking.prediction import (
 
 #: Covariances of tracks of people.
 UNCERTAIN = np.kron([[0.02, 0.02], [0.02, 0.05]], np.eye(2))
-WALKING = np.kron([[0.01, 0.01], [0.01, 0.03]], np.eye(2))
 TIMES_S = np.array([0.0, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0])
 
 
@@ -104,9 +103,7 @@ def test_the_covariance_grows_with_the_horizon(state: FloatArray, covariance: Fl
 
 
 @given(state=states, covariance=covariances(), model=models(), angle=finite(-math.pi, math.pi))
-def test_nothing_is_predicted_outside_the_envelope(
-    state: FloatArray, covariance: FloatArray, model: PredictionModel, angle: float
-) -> None:
+def test_nothing_is_predicted_outside_the_envelope(state, covariance, model, angle) -> None:
     """The region reaches beyond the track's own uncertainty only as far as a person can get."""
     found = predict_states(state, covariance[None], TIMES_S, model)
     track = track_of(position=state[0, :2], velocity=state[0, 2:], covariance=covariance)
@@ -187,12 +184,6 @@ def test_factors_scale_the_standard_deviations_between_their_horizons() -> None:
     scaled = predict_ahead(track, times_s, model).covariances_odom_m2[0]
     ratio = np.sqrt(scaled[:, 0, 0] / plain[:, 0, 0])
     np.testing.assert_allclose(ratio, [1.0, 1.0, 1.5, 2.0, 2.0])
-
-
-def test_a_model_is_the_same_after_yaml(tmp_path: Path) -> None:
-    model = PredictionModel(slow_change_mps=0.4, horizons_s=(0.5, 2.0), std_factors=(1.1, 0.9))
-    model.to_yaml(tmp_path / "prediction.yaml")
-    assert PredictionModel.from_yaml(tmp_path / "prediction.yaml") == model
 
 
 def test_a_calibration_is_read_as_it_was_written_or_not_at_all(tmp_path: Path) -> None:

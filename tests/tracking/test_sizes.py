@@ -101,13 +101,6 @@ def test_the_size_that_a_scanner_measured_holds_when_it_is_lost(ratio):
     assert tracks[0].id == 1
 
 
-def test_without_a_scanner_the_same_person_is_placed_too_far():
-    (track,) = after_images(both(), np.arange(0.0, 3.0, 0.05), ratio=1.4)
-    range_m, std_m = range_and_std(track)
-    assert range_m == pytest.approx(1.4 * np.hypot(*PLACE_M), rel=0.03)
-    assert abs(range_m - np.hypot(*PLACE_M)) < 2.45 * std_m
-
-
 def test_the_size_that_feet_or_depth_told_holds_when_they_are_hidden():
     tracker = PersonTracker()
     after_images(tracker, np.arange(0.0, 1.0, 0.05), lasting=0.03, size_ratio=1.6)

@@ -13,24 +13,16 @@ from hypothesis import strategies as st
 from tracking_scenes import CAMERA, camera_at, observe, white_acceleration
 
 from tracking import PersonTrack, PersonTracker, SensorConfig, TrackerConfig
+from tracking.covariances import drifted, matrices
 
 # Without gates.
 CONFIG = TrackerConfig(
-    gate_probability=1.0 - 1e-12,
-    gate_distance_m=50.0,
-    miss_cost=1e3,
-    confirm_logit=-100.0,
+    gate_probability=1.0 - 1e-12, gate_distance_m=50.0, miss_cost=1e3, confirm_logit=-100.0
 )
 
 
-@given(
-    low=st.floats(0.0, 0.01),
-    extra=st.floats(0.0, 0.01),
-    angle=st.floats(-np.pi, np.pi),
-)
-def test_the_noise_floor_raises_eigenvalues_and_keeps_directions(
-    low: float, extra: float, angle: float
-) -> None:
+@given(low=st.floats(0.0, 0.01), extra=st.floats(0.0, 0.01), angle=st.floats(-np.pi, np.pi))
+def test_the_noise_floor_raises_eigenvalues_and_keeps_directions(low, extra, angle) -> None:
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     eigenvalues = np.array([low, low + extra])
     measured_m2 = turn @ np.diag(eigenvalues) @ turn.T
@@ -116,3 +108,15 @@ def test_the_velocity_of_somebody_who_stood_dies_away_once_they_are_unseen(ahead
     np.testing.assert_allclose(later.position_odom_m, state[:2], atol=1e-9)
     np.testing.assert_allclose(later.velocity_odom_mps, state[2:], atol=1e-9)
     np.testing.assert_allclose(later.covariance_odom, covariance, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_covariance_ahead_is_that_of_constant_velocity(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    roots = rng.normal(size=(2, 4, 4))
+    given = roots @ roots.transpose(0, 2, 1)
+    ahead_s = [0.0, float(rng.uniform(0.0, 3.0))]
+    uppers = [tuple(P[np.triu_indices(4)].tolist()) for P in given]
+    found = matrices([drifted(upper, dt_s) for upper, dt_s in zip(uppers, ahead_s, strict=True)])
+    F, _ = white_acceleration(ahead_s[1], 1.0)
+    np.testing.assert_allclose(found, [given[0], F @ given[1] @ F.T], rtol=1e-12, atol=1e-12)

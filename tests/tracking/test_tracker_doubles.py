@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 from tracking_scenes import CAMERA, PERIOD_S, FloatArray, observe
 
-from tracking import (
-    PersonTrack,
-    PersonTracker,
-    TrackerConfig,
-)
+from tracking import PersonTrack, PersonTracker, TrackerConfig
 
 Scene = list[list[FloatArray]]
 NOISE_M = 0.1
@@ -42,31 +38,26 @@ def pair_scene(
     *,
     apart_m: float = 0.4,
     seconds: float = 20.0,
-    hidden_s: tuple[float, float] | None = None,
     crossing: bool = False,
 ) -> Scene:
     """Return frames of two people beside each other, each detected in a share of the frames.
 
-    ``hidden_s`` has the mean time in which the second is visible, and hidden. People who cross
-    pass each other every four seconds.
+    People who cross pass each other every four seconds.
     """
     rng = np.random.default_rng([8, seed])
     angle = rng.uniform(0.0, 2.0 * math.pi)
     offset = apart_m * np.array([math.cos(angle), math.sin(angle)])
     frames: Scene = []
-    visible = True
     for frame in range(round(seconds / PERIOD_S)):
         t = frame * PERIOD_S
         place = np.array([5.0, 2.5 * math.sin(0.3 * t)])
         other = place + (
             np.array([apart_m / 2.0, 3.0 * math.sin(math.pi * t / 4.0)]) if crossing else offset
         )
-        if hidden_s is not None and rng.random() < PERIOD_S / hidden_s[0 if visible else 1]:
-            visible = not visible
         seen = []
         if rng.random() < shares[0]:
             seen.append(place + rng.normal(0.0, NOISE_M, 2))
-        if visible and rng.random() < shares[1]:
+        if rng.random() < shares[1]:
             seen.append(other + rng.normal(0.0, NOISE_M, 2))
         frames.append(seen)
     return frames
@@ -123,16 +114,6 @@ def test_people_who_cross_stay_two() -> None:
         assert (confirmed_counts(follow(scene))[40:] >= 2).all()
 
 
-def test_a_twin_that_walks_away_is_a_person_again() -> None:
-    scene = twin_scene(1)
-    merged = follow(scene)[-1]
-    assert [one.status for one in merged].count("confirmed") <= 1
-    last = np.array([5.0, 2.5 * math.sin(0.3 * 20.0)])
-    leaving = [[last, last + np.array([0.35 + 0.05 * step, 0.0])] for step in range(1, 31)]
-    counts = confirmed_counts(follow(scene + leaving))
-    assert counts[-1] == 2
-
-
 def test_a_person_with_a_twin_is_kept_as_long_unseen_as_anybody() -> None:
     missed_s = TrackerConfig().max_missed_s
     for seed in range(3):
@@ -149,9 +130,7 @@ def test_a_second_box_without_a_face_takes_no_awareness() -> None:
 
 
 @pytest.mark.parametrize("awareness", [(0.95, 0.05), (0.05, 0.95)])
-def test_two_boxes_on_one_body_are_as_aware_as_the_less_aware(
-    awareness: tuple[float, float],
-) -> None:
+def test_two_boxes_on_one_body_are_as_aware_as_the_less_aware(awareness) -> None:
     """A detector without suppression reports each person twice in every frame."""
     rng = np.random.default_rng(3)
     scene: Scene = [

@@ -22,8 +22,6 @@ from tracking import (
 )
 
 REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=3.0))
-LAG_S = REMEMBERS.max_lag_s
-
 numbers = (
     st.sampled_from([0.0, 1e-9, -1e-170, 5e-324, 1.0, -1.2, 4.0, 1e6, 1e7, -1e7, 1e30])
     | st.floats(-10.0, 10.0)
@@ -66,12 +64,9 @@ frames = st.tuples(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.lists(frames, min_size=1, max_size=12), st.booleans())
-def test_any_finite_input_gives_valid_tracks_or_a_tracking_error(
-    sequence: list[tuple[float, list[PersonObservation], FloatArray, float | None, str]],
-    with_views: bool,
-) -> None:
+def test_any_finite_input_gives_valid_tracks_or_a_tracking_error(sequence, with_views) -> None:
     tracker = both(REMEMBERS)
     if not with_views:
         tracker = PersonTracker(REMEMBERS, sensors={LASER: SensorConfig()})
@@ -183,8 +178,8 @@ def assert_same(
     mirrored=st.booleans(),
 )
 def test_a_world_that_is_turned_mirrored_or_shifted_has_the_same_people(
-    seed: int, x_m: float, y_m: float, yaw: float, mirrored: bool
-) -> None:
+    seed, x_m, y_m, yaw, mirrored
+):
     c, s = np.cos(yaw), np.sin(yaw)
     world, sign = np.eye(4), -1.0 if mirrored else 1.0
     world[:2, :2] = [[c, -sign * s], [s, sign * c]]
@@ -212,22 +207,9 @@ def test_a_world_that_is_turned_mirrored_or_shifted_has_the_same_people(
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10**6), earlier=st.integers(1, 4))
-def test_numbers_that_were_given_before_change_nothing_but_the_numbers(
-    seed: int, earlier: int
-) -> None:
+def test_numbers_that_were_given_before_change_nothing_but_the_numbers(seed, earlier) -> None:
     tracker, frames = both(REMEMBERS), events(seed)
     crowd = [seen_by_laser((2.0, y_m), -5.0) for y_m in range(earlier)]
     tracker.update(crowd, -5.0, laser_at(), sensor=LASER)
     tracker.reset()
     assert_same(played(frames), played(frames, tracker), later_ids=earlier)
-
-
-@settings(max_examples=10, deadline=None)
-@given(seed=st.integers(0, 10**6), share=st.floats(0.05, 0.99))
-def test_frames_of_two_sensors_may_come_in_any_order_within_the_lag(
-    seed: int, share: float
-) -> None:
-    frames, rng = events(seed), np.random.default_rng(seed)
-    arrivals_s = [stamp_s + share * LAG_S * rng.uniform() for stamp_s, *_ in frames]
-    late = [frames[index] for index in np.argsort(arrivals_s)]
-    assert_same(played(frames), played(late))

@@ -85,10 +85,7 @@ FRAMES: list[tuple[dict[str, Any], str]] = [
     ({"T_odom_camera": altered(1, 0, 1.0)}, r"T_odom_camera\[:3, :3\] must be a rotation"),
     ({"T_odom_camera": altered(3, 0, 0.5)}, "T_odom_camera must have the last row"),
     ({"observations": 3}, "observations must be an iterable of PersonObservation, got int"),
-    (
-        {"observations": [*seen(), None]},
-        r"observations\[2\] must be a PersonObservation, got NoneType",
-    ),
+    ({"observations": [*seen(), None]}, r"observations\[2\] must be a Person.*, got NoneType"),
     ({"observations": [np.zeros(3)]}, r"observations\[0\] must be a Person.*, got ndarray"),
     (
         {"observations": [*seen(), observe((1.0, 0.0), 9 * PERIOD_S)]},
@@ -99,22 +96,13 @@ FRAMES: list[tuple[dict[str, Any], str]] = [
         {"observations": [replace(seen()[0], range_lasting_relative_std=1.5)]},
         r"observations\[0\].range_lasting_relative_std must be at most 1, got 1.5",
     ),
-    (
-        {"T_odom_camera": altered(0, 3, 1e8)},
-        r"observations\[0\] must lie within 1e\+07 m of",
-    ),
+    ({"T_odom_camera": altered(0, 3, 1e8)}, r"\[0\] must lie within 1e\+07 m of"),
     (
         {"observations": far((1.7e308, 1.7e308)), "T_odom_camera": camera_at(yaw_rad=0.8)},
         r"observations\[2\].position_camera_m must lie within",
     ),
-    (
-        {"observations": far((1.0, 0.0), covariance_odom_m2=1e200)},
-        r"observations\[2\].position_covariance_m2 must sum to at most",
-    ),
-    (
-        {"pose_covariance_odom": np.eye(2)},
-        r"pose_covariance_odom must have shape \(3, 3\), got \(2, 2\)",
-    ),
+    ({"observations": far((1.0, 0.0), covariance_odom_m2=1e200)}, r"\[2\].*_m2 must sum to at"),
+    ({"pose_covariance_odom": np.eye(2)}, r"must have shape \(3, 3\), got \(2, 2\)"),
     ({"pose_covariance_odom": np.diag([1.0, 1.0, -1.0])}, "must be positive semi-definite"),
     ({"pose_covariance_odom": np.diag([1, 1, math.nan])}, "pose_covariance_odom must be finite"),
     ({"pose_covariance_odom": np.diag([1e200, 1.0, 1.0])}, "the pose's share included"),
@@ -129,9 +117,7 @@ FRAMES: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("changes", "message"), FRAMES)
-def test_a_refused_frame_is_named_and_changes_nothing(
-    changes: dict[str, Any], message: str
-) -> None:
+def test_a_refused_frame_is_named_and_changes_nothing(changes, message) -> None:
     tracker, twin = watched(Answers()), watched(Answers())
     frame = {"observations": seen(), "stamp_s": NOW_S, "T_odom_camera": CAMERA}
     with pytest.raises(TrackingError, match=message):
@@ -178,10 +164,7 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: PersonTracker({"max_coast_s": 2.0}), "config must be a TrackerConfig, got dict"),
     (lambda: both().update([], 0.0, laser_at(), sensor="lidar"), "'camera', 'laser', got 'lidar'"),
     (lambda: PersonTracker(sensors={"camera": SensorConfig()}), "names of their own, got 'cam"),
-    (
-        lambda: PersonTracker(sensors={LASER: ScannerView()}),
-        r"sensors\['laser'\] must be a SensorConfig, got Sc",
-    ),
+    (lambda: PersonTracker(sensors={LASER: ScannerView()}), "'laser'.* must be a Sensor.*, got Sc"),
     (lambda: PersonTracker(sensors=[SensorConfig()]), "mapping of names to SensorConfig, got list"),
     (lambda: PersonTracker(view=LENS), r"view must have a method visibility.*got Camera"),
     (lambda: SensorConfig(view=3), "view must have a method visibility"),
@@ -223,10 +206,7 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: predict_ahead(track_of(), [math.nan]), "horizons_s"),
     (lambda: predict_ahead(track_of(), 1.0), "horizons_s"),
     (lambda: PredictionModel(horizons_s=[1.0]), "equally long, got 1 and 0 values"),
-    (
-        lambda: PredictionModel(horizons_s=[1.0, 0.5], std_factors=[1, 1]),
-        "must increase from above 0 s",
-    ),
+    (lambda: PredictionModel(horizons_s=[1.0, 0.5], std_factors=[1, 1]), "must increase from"),
     (lambda: PredictionModel(horizons_s=[0.0], std_factors=[1]), "must increase from above 0 s"),
     (lambda: PredictionModel(horizons_s=[1.0], std_factors=[20]), r"must lie in \[0.1, 10\]"),
     (lambda: PredictionModel(respons_s=1.0), "did you mean 'response_s'"),

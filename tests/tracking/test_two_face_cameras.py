@@ -6,22 +6,15 @@ import math
 from collections.abc import Callable
 
 import pytest
-from fusion_scenes import laser_at, seen_by_laser
+from fusion_scenes import REMEMBERS
 from tracking_scenes import camera_at, observe
 
 from perception import PersonObservation
-from tracking import (
-    AwarenessFilterConfig,
-    PersonTrack,
-    PersonTracker,
-    SensorConfig,
-    TrackerConfig,
-)
+from tracking import PersonTrack, PersonTracker, SensorConfig
 
 REAR = "rear"
 PERIOD_S = 1.0 / 15.0
 LAG_S = 0.001
-REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=4.0))
 Sees = Callable[[int], bool]
 
 
@@ -93,9 +86,7 @@ def test_the_lag_between_the_cameras_does_not_matter(lag_s: float) -> None:
 
 @pytest.mark.parametrize("rate_hz", [5.0, 15.0])
 @pytest.mark.parametrize("rear", [always, never], ids=["both", "front"])
-def test_a_missed_pair_of_frames_costs_no_more_than_with_one_camera(
-    rear: Sees, rate_hz: float
-) -> None:
+def test_a_missed_pair_of_frames_costs_no_more_than_with_one_camera(rear, rate_hz) -> None:
     def sees(step: int) -> bool:
         return step != 20
 
@@ -112,23 +103,3 @@ def test_a_camera_that_sees_the_face_turned_away_ends_awareness() -> None:
     away = run(always, always, alpha=lambda step: 0.9 if step < 20 else 0.1)
     assert away[19].awareness_lower == aware[19].awareness_lower
     assert away[24].awareness_lower < 0.1
-
-
-def test_one_camera_for_faces_and_a_scanner_are_as_before() -> None:
-    """Bit by bit what the camera alone gives for α, whenever the scans come."""
-    trackers = [
-        PersonTracker(REMEMBERS, sensors={"laser": SensorConfig(alignment_std_rad=0.0)}),
-        PersonTracker(REMEMBERS),
-    ]
-    for step in range(40):
-        now = step * PERIOD_S
-        both = []
-        for tracker, has_laser in zip(trackers, (True, False), strict=True):
-            if has_laser and step > 5:
-                scan = [seen_by_laser((3.0, 0.0), now - LAG_S)]
-                tracker.update(scan, now - LAG_S, laser_at(), sensor="laser")
-            seen = [observe((3.0, 0.0), now, awareness=0.8)]
-            both.append(tracker.update(seen, now, camera_at()))
-        (ours,), (single,) = both
-        assert ours.awareness_lower == single.awareness_lower
-        assert ours.awareness == single.awareness

@@ -43,9 +43,7 @@ def _trapezoid(t_s: np.ndarray, speed_mps: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("speed_mps", "duration_s"), [(0.15, 12.0), (1.5, 4.1)])
-def test_follows_the_ideal_trapezoid_straight_ahead(
-    hall: Warehouse, speed_mps: float, duration_s: float
-) -> None:
+def test_follows_the_ideal_trapezoid_straight_ahead(hall, speed_mps, duration_s) -> None:
     amr = Amr(hall, (-2.0, 0.0))
     states = _drive(hall, amr, duration_s, speed_mps)
     t = np.array([state.stamp_s for state in states])

@@ -64,9 +64,7 @@ def test_soles_do_not_slide_sink_or_float(name: str, speed_mps: float) -> None:
 
 @given(st.sampled_from(NAMES), st.booleans(), st.floats(0.1, 2.0), st.floats(0.0, 4.0))
 @settings(max_examples=30, deadline=None)
-def test_legs_reach_their_feet_exactly(
-    name: str, child: bool, speed_mps: float, walked_m: float
-) -> None:
+def test_legs_reach_their_feet_exactly(name, child, speed_mps, walked_m) -> None:
     """At the hip height of the gait both ankles are within reach with unlocked knees."""
     gait, bones = _gait(name, 1.0 if child else load_worker(name).stature_m)
     pose = steady_walk(gait, walked_m, speed_mps)

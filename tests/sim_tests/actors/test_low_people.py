@@ -48,8 +48,8 @@ def in_body(points_odom_m: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("stature_m", [None, 1.1])
 def test_seated_thighs_are_level_shanks_upright_and_the_trunk_is_above_the_place(
-    hall: Warehouse, look: str, stature_m: float | None
-) -> None:
+    hall, look, stature_m
+):
     worker = seated(hall, look, stature_m)
     points = in_body(worker.keypoints_odom_m)
     size = worker.stature_m / 1.75
@@ -109,9 +109,7 @@ def test_a_robot_meets_the_seat_and_it_leaves_with_the_person() -> None:
 
 @pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("stature_m", [None, 1.1])
-def test_kneeling_thighs_are_upright_and_knees_and_feet_on_the_floor(
-    hall: Warehouse, look: str, stature_m: float | None
-) -> None:
+def test_kneeling_thighs_are_upright_and_knees_and_feet_on_the_floor(hall, look, stature_m) -> None:
     worker = Worker(hall, stature_m, look=look)
     worker.place((0.0, 0.0), 0.0, activity="kneeling")
     points = worker.keypoints_odom_m

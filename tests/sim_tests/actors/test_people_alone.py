@@ -46,7 +46,7 @@ def walk(people: list[Person], seconds: float, robot: RobotBody | None = None) -
     pause_s=st.sampled_from([0.0, 2.0]),
     seconds=st.sampled_from([4.0, 25.0]),
 )
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 def test_nobody_is_delayed_without_a_robot(seed, population, count, pause_s, seconds):
     pauses = [{"at_m": 3.0, "for_s": pause_s}] if pause_s else []
     people = walkers(seed, population, count, pauses=pauses)

@@ -140,11 +140,10 @@ def test_nobody_looks_through_a_rack() -> None:
         assert noticed_s(asked) == (None,)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("into", [0.0, 1.0])
-def test_a_startle_stays_within_the_speed_that_the_limit_counts_with(
-    kind: str, into: float, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize(
+    ("kind", "into"), [*((kind, 1.0) for kind in KINDS), ("walker", 0.0), ("replayed", 0.0)]
+)
+def test_a_startle_stays_within_the_speed_that_the_limit_counts_with(kind, into, tmp_path) -> None:
     """A person off the robot's line stops, steps aside, or steps towards it, and walks on."""
     people = of_kind(kind, tmp_path)
     jumpy = {**DEAF, "startles": 1.0, "startles_into_path": into, "delay_spread": 1.0}

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nav_adapter.rigid import Motion
 from sim_tests import run_crossing
-from sim_tests.actors.behaviour import Person, PersonSpec, RobotBody, Surroundings
+from sim_tests.actors.behaviour import MovingBody, Person, PersonSpec, RobotBody, Surroundings
 from sim_tests.scenario import Scenario
 
 DT_S = 0.05
@@ -89,7 +89,9 @@ class Encounter:
             body = RobotBody(
                 *now[:3], *now.velocity_mps, 0.36, 0.25, (*now[:2], 1.0), now.yaw_rate_radps
             )
-            person.step(step * DT_S, Surroundings(body, (), lambda: True))
+            met = world.motion(Motion(4.0 - step * DT_S, 0.5, math.pi, 1.0))
+            others = (MovingBody(*met[:2], *met.velocity_mps),) if social else ()
+            person.step(step * DT_S, Surroundings(body, others, lambda: True))
             places.append(person.place_odom_m)
             reactions.append(person.reaction)
         return np.array(places), reactions
@@ -101,7 +103,7 @@ class Encounter:
     mirrored=st.booleans(),
     shift=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)),
 )
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_reactions_do_not_depend_on_where_the_world_lies(seed, turn_rad, mirrored, shift):
     """Social forces are left out where the world is mirrored: people step to the right there."""
     encounter, world = Encounter.drawn(seed), World(turn_rad, mirrored, shift)
@@ -112,19 +114,8 @@ def test_reactions_do_not_depend_on_where_the_world_lies(seed, turn_rad, mirrore
     np.testing.assert_allclose(there, [world.place(*each) for each in usual.tolist()], atol=1e-6)
 
 
-def test_somebody_from_the_left_reacts_as_somebody_from_the_right():
-    robot = Motion(0.0, 0.0, 0.0, 1.0)
-    for reaction in REACTIONS:
-        right = Encounter(robot, ((5.0, -5.0), (5.0, 5.0)), reaction)
-        usual, reactions = right.path(World(), social=False)
-        mirrored, same = right.path(World(mirrored=True), social=False)
-        assert reaction in reactions
-        assert same == reactions
-        np.testing.assert_allclose(mirrored, usual * [1.0, -1.0], atol=1e-9)
-
-
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_nobody_who_waits_steps_towards_the_path_of_the_robot(seed):
     encounter = Encounter.drawn(seed, "wait")
     robot = encounter.robot
@@ -176,7 +167,7 @@ class _Turns:
         return 0.8, 0.8 if turns else 0.0
 
 
-@pytest.mark.parametrize("start_s", [1.0, 1.75, 2.5, 3.25])
+@pytest.mark.parametrize("start_s", [1.0, 2.5])
 def test_a_robot_that_turns_strikes_nobody_who_waits(start_s):
     person = {
         "name": "waits",

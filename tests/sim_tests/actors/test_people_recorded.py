@@ -141,9 +141,7 @@ def test_a_far_robot_changes_nothing(bend: Path) -> None:
 
 
 @pytest.mark.parametrize("robot_mps", [0.0, 1.2])
-def test_a_person_in_the_way_goes_round_the_robot_and_comes_back_in_time(
-    bend: Path, robot_mps: float
-) -> None:
+def test_a_person_in_the_way_goes_round_the_robot_and_comes_back_in_time(bend, robot_mps) -> None:
     (person,) = recorded_people(bend, NO_BOXES, reacts=True)
     (recorded,) = recorded_people(bend, NO_BOXES)
     start_x_m = 6.0 + robot_mps * 6.0

@@ -94,42 +94,6 @@ def test_the_walk_does_not_depend_on_how_often_it_is_sampled():
     np.testing.assert_allclose(often, rare, atol=1e-9)
 
 
-@pytest.mark.parametrize(("angle", "shift"), [(0.7, (3.0, -2.0)), (math.pi / 2, (0.0, 0.0))])
-def test_rotating_the_world_rotates_the_walk(angle, shift):
-    cos, sin = math.cos(angle), math.sin(angle)
-    R = np.array([[cos, -sin], [sin, cos]])
-
-    def moved(x, y):
-        return (R @ [x, y] + shift).tolist()
-
-    def rows(turn: bool) -> np.ndarray:
-        place = moved if turn else (lambda x, y: [x, y])
-        way = (lambda x, y: (R @ [x, y]).tolist()) if turn else (lambda x, y: [x, y])
-        person = walker([place(0, -3), place(0, 3), place(2, 4)], reactions={"pass_behind": 1.0})
-        out = []
-        for n in range(121):
-            t = n * DECISION_PERIOD_S
-            robot = RobotBody(
-                *place(-2.6 + 0.8 * t, 0.2),
-                angle if turn else 0.0,
-                *way(0.8, 0.0),
-                0.36,
-                0.25,
-                (*place(-2.4 + 0.8 * t, 0.2), 1.4),
-            )
-            other = MovingBody(*place(0.4, 3.0 - t), *way(0.0, -1.0))
-            m = person.step(t, Surroundings(robot, (other,), lambda: True))
-            heading = m.heading_odom_rad
-            out.append((*m.position_odom_m, math.cos(heading), math.sin(heading), m.head_yaw_rad))
-        assert person.outcome().reaction == "pass_behind"
-        return np.array(out)
-
-    here, there = rows(False), rows(True)
-    np.testing.assert_allclose(there[:, :2], here[:, :2] @ R.T + shift, atol=1e-6)
-    np.testing.assert_allclose(there[:, 2:4], here[:, 2:4] @ R.T, atol=1e-6)
-    np.testing.assert_allclose(there[:, 4], here[:, 4], atol=1e-6)
-
-
 coordinate = st.floats(-4.0, 4.0)
 
 

@@ -129,10 +129,10 @@ def watched(habits: str, seed: int, **changes: object) -> tuple[float, bool]:
 
 def test_half_a_second_of_looks_takes_the_robot_in_by_half() -> None:
     """The rule by which the tracker believes it, for looks of any length."""
-    looked_s = np.array([watched("recorded", seed)[0] for seed in range(400)])
+    looked_s = np.array([watched("recorded", seed)[0] for seed in range(200)])
     for t_s in (0.25, 0.5, 1.0):
         share = -math.expm1(-t_s / NOTICING_S)
-        spread = 4.0 * math.sqrt(share * (1.0 - share) / 400.0)
+        spread = 4.0 * math.sqrt(share * (1.0 - share) / len(looked_s))
         assert np.mean(looked_s < t_s - 1e-9) == pytest.approx(share, abs=spread)
     assert not any(watched("classic", seed)[1] for seed in range(4))
 

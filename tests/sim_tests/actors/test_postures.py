@@ -98,9 +98,7 @@ def test_no_limb_passes_through_another(workers: dict[str, Worker], look: str) -
 
 @pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("speed_mps", [0.0, 1.2])
-def test_a_box_is_level_before_the_belly_and_between_the_hands(
-    workers: dict[str, Worker], look: str, speed_mps: float
-) -> None:
+def test_a_box_is_level_before_the_belly_and_between_the_hands(workers, look, speed_mps) -> None:
     worker = workers[look]
     for part in np.arange(4) / 4:
         walked = part * float(worker.gait.stride_m(max(speed_mps, 0.1)))
@@ -159,9 +157,7 @@ def test_a_phone_is_in_the_hand_before_the_eyes(workers: dict[str, Worker], look
     st.floats(0.0, 1.8),
 )
 @settings(max_examples=15, deadline=None)
-def test_hands_change_smoothly_from_one_activity_to_the_next(
-    workers: dict[str, Worker], change: tuple[str, str], share: float, speed_mps: float
-) -> None:
+def test_hands_change_smoothly_from_one_activity_to_the_next(workers, change, share, speed_mps):
     worker = workers["amina"]
     before, name = change
 

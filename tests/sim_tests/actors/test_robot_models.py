@@ -88,7 +88,7 @@ twists = st.lists(
 )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.sampled_from(KINEMATIC), twists)
 def test_a_body_moves_within_the_limits_of_its_profile(name: str, commands: list) -> None:
     model = RobotModel.shipped(name)

@@ -31,13 +31,8 @@ vectors = st.tuples(*[st.floats(-0.08, 0.08)] * 2, st.floats(-0.5, -0.25))
 )
 @settings(max_examples=60, deadline=None)
 def test_two_bone_ik_brings_the_tip_to_its_target(
-    first: tuple[float, float, float],
-    second: tuple[float, float, float],
-    forwards_rad: float,
-    outwards_rad: float,
-    stretched: float,
-    twist_rad: float,
-) -> None:
+    first, second, forwards_rad, outwards_rad, stretched, twist_rad
+):
     """For bones off the line and targets anywhere; checked by forward kinematics."""
     bones = TwoBoneLimb(first, second, (0.0, 1.0, 0.0))
     target = np.array([math.sin(forwards_rad), math.sin(outwards_rad), -1.0])
@@ -75,9 +70,7 @@ rotvecs = st.tuples(angles, angles, angles)
 
 @given(st.lists(rotvecs, min_size=16, max_size=16), st.floats(0.8, 1.2), rotvecs)
 @settings(max_examples=12, deadline=None)
-def test_kinematics_against_scipy_joint_by_joint(
-    bends: list, scale: float, turn: tuple[float, float, float]
-) -> None:
+def test_kinematics_against_scipy_joint_by_joint(bends, scale, turn) -> None:
     """Links, pieces and skin points against a plain product of rotations about joints."""
     asset = load_worker("giulia")
     T_odom_body = np.eye(4)

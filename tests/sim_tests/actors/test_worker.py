@@ -143,8 +143,8 @@ def test_stands_upright_on_the_floor_as_tall_as_asked(hall: Warehouse, look: str
 @given(st.floats(-3.0, 3.0), st.fixed_dictionaries(heads), st.floats(0.0, 2.0))
 @settings(max_examples=25, deadline=None)
 def test_head_and_eyes_turn_by_the_given_angles_and_nothing_else_moves(
-    worker: Worker, heading_rad: float, head: dict, speed_mps: float
-) -> None:
+    worker, heading_rad, head, speed_mps
+):
     worker.place((1.0, -1.0), heading_rad, 0.3, speed_mps)
     body = np.array(worker.keypoints_odom_m[7:])
     worker.place((1.0, -1.0), heading_rad, 0.3, speed_mps, **head)
@@ -189,9 +189,7 @@ def test_head_and_eyes_turn_by_the_given_angles_and_nothing_else_moves(
         ("activity", "dance"),
     ],
 )
-def test_invalid_placements_are_refused_and_move_nothing(
-    hall: Warehouse, worker: Worker, name: str, value: object
-) -> None:
+def test_invalid_placements_are_refused_and_move_nothing(hall, worker, name, value) -> None:
     worker.place((0.5, 0.5), 0.5, 0.5, 0.5, 0.5, 0.5, activity="phone")
     before = worker.keypoints_odom_m.tobytes()
     base = pybullet.getBasePositionAndOrientation(worker.body, physicsClientId=hall.client)

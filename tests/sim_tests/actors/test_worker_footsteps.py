@@ -146,9 +146,7 @@ corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_si
 @example([(1.2, -1.8), (-1.1, 1.7), (0.4, -1.0), (-0.9, 0.1)], 1.5, 0.0, False)  # sharp turns
 @example([(0.2, 1.9), (0.2, 1.9), (1.0, 1.6)], 1.5, 17.0, False)  # a short run askew
 @settings(max_examples=6, deadline=None)
-def test_stance_feet_stay_in_any_walk(
-    places: list, speed_mps: float, heading_deg: float, ahead: bool
-) -> None:
+def test_stance_feet_stay_in_any_walk(places, speed_mps, heading_deg, ahead) -> None:
     """In any walk a flat foot does not move, hips stay up, and no foot leaps.
 
     These walks turn at once, as no human does, and feet do not know what comes: in 900 of them the

@@ -44,8 +44,8 @@ def test_losses_and_delays_have_the_configured_statistics() -> None:
     st.integers(0, 99),
 )
 def test_the_queue_returns_each_frame_once_when_it_has_arrived(
-    rate_hz: float, drop_rate: float, latency_s: float, jitter_s: float, seed: int
-) -> None:
+    rate_hz, drop_rate, latency_s, jitter_s, seed
+):
     timing = CameraTiming(
         rate_hz=rate_hz, drop_rate=drop_rate, latency_s=latency_s, latency_jitter_s=jitter_s
     )
@@ -82,9 +82,7 @@ def test_frames_that_arrive_together_come_in_the_order_they_were_taken() -> None
     ("rate_hz", "tick_hz", "per_second"),
     [(None, 20.0, 20), (10.0, 60.0, 10), (30.0, 60.0, 30), (60.0, 20.0, 20), (24.0, 60.0, 24)],
 )
-def test_a_clock_takes_as_many_frames_as_the_slower_of_rate_and_ticks(
-    rate_hz: float | None, tick_hz: float, per_second: int
-) -> None:
+def test_a_clock_takes_as_many_frames_as_the_slower_of_rate_and_ticks(rate_hz, tick_hz, per_second):
     clock = FrameClock(CameraTiming(rate_hz=rate_hz), np.random.default_rng(0))
     taken = [k / tick_hz for k in range(round(10 * tick_hz)) if clock.tick(k / tick_hz)[0]]
     assert len(taken) == 10 * per_second

@@ -41,9 +41,7 @@ def _loss(hall: Warehouse, light: Lighting, pose: np.ndarray) -> tuple[np.ndarra
 
 
 @pytest.mark.parametrize("direction", LAMPS)
-def test_the_shadow_of_a_ball_is_where_the_rays_put_it(
-    hall_with_ball: tuple[Warehouse, int], direction: tuple[float, float, float]
-) -> None:
+def test_the_shadow_of_a_ball_is_where_the_rays_put_it(hall_with_ball, direction) -> None:
     hall, number = hall_with_ball
     light = Lighting(ambient=0.3, diffuse=0.6, direction_odom=direction)
     centre = np.array([0.4, 0.1, 0.8])

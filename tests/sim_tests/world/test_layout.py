@@ -13,8 +13,6 @@ from hypothesis import strategies as st
 
 from sim_tests.world.hall import LAYOUTS, PROP_PARTS, Prop, WarehouseLayout
 
-_HALL = {"x_min_m": 0.0, "y_min_m": 0.0, "x_max_m": 5.0, "y_max_m": 5.0}
-
 
 def _blocked(layout: WarehouseLayout, start: tuple[float, float], end: tuple[float, float]) -> bool:
     """Return whether an obstacle's footprint lies on the way, sampled every centimetre."""
@@ -68,9 +66,7 @@ def test_a_hall_survives_its_file(tmp_path: Path) -> None:
     st.floats(-9.0, 9.0),
     st.floats(-9.0, 9.0),
 )
-def test_the_boxes_of_a_prop_bound_its_rotated_parts(
-    kind: str, yaw: float, x: float, y: float
-) -> None:
+def test_the_boxes_of_a_prop_bound_its_rotated_parts(kind, yaw, x, y) -> None:
     prop = Prop(kind=kind, x_m=x, y_m=y, yaw_deg=yaw)
     c, s = math.cos(math.radians(yaw)), math.sin(math.radians(yaw))
     rotation = np.array([[c, -s], [s, c]])

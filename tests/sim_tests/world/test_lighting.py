@@ -33,9 +33,7 @@ def hall_with_face() -> Iterator[tuple[Warehouse, Mesh]]:
 
 
 @pytest.mark.parametrize("name", LIGHTINGS)
-def test_a_lit_face_has_the_colour_of_the_formula(
-    hall_with_face: tuple[Warehouse, Mesh], name: str
-) -> None:
+def test_a_lit_face_has_the_colour_of_the_formula(hall_with_face, name) -> None:
     hall, face = hall_with_face
     light = Lighting.preset(name)
     view = CameraRenderer(hall, lighting=light, shadows=False).render(

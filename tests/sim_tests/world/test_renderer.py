@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from camera_poses import level_pose, pixel_rays
-from visual_actors import ShapeActor, ball
+from visual_actors import ball
 
 from perception import Camera
 from sim_tests.world import Warehouse
@@ -22,9 +21,7 @@ def renderer(hall: Warehouse) -> CameraRenderer:
     return CameraRenderer(hall)
 
 
-def test_a_ball_appears_where_it_is_projected(
-    renderer: CameraRenderer, add_actor: Callable[[ShapeActor], int]
-) -> None:
+def test_a_ball_appears_where_it_is_projected(renderer, add_actor) -> None:
     actor = ball(colour=(1.0, 0.0, 0.0))
     number = add_actor(actor)
     rng = np.random.default_rng(3)
@@ -59,9 +56,7 @@ def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float)
     np.testing.assert_allclose(view.depth_m[near], expected[near], rtol=4e-3)
 
 
-def test_a_rectangle_is_that_part_of_the_whole(
-    renderer: CameraRenderer, add_actor: Callable[[ShapeActor], int]
-) -> None:
+def test_a_rectangle_is_that_part_of_the_whole(renderer, add_actor) -> None:
     add_actor(ball(position_m=(2.0, 0.1, 1.5)))
     T = level_pose((0.0, 0.0, 1.4), 0.0)
     whole = renderer.render(OFF_CENTRE, T)
@@ -76,9 +71,7 @@ def test_a_rectangle_is_that_part_of_the_whole(
 
 
 @pytest.mark.parametrize("heading_deg", [90.0, -90.0])
-def test_corners_in_the_cameras_plane_do_no_harm(
-    renderer: CameraRenderer, heading_deg: float
-) -> None:
+def test_corners_in_the_cameras_plane_do_no_harm(renderer, heading_deg) -> None:
     """The floor's tiles meet at y = 0 under the camera: its image equals one from 1 cm beside."""
     camera = Camera.from_fov(160, 160, math.radians(110.0))
     at, beside = (

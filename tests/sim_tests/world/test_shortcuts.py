@@ -106,9 +106,7 @@ def _same_look(
 @given(
     st.integers(1, 30), st.floats(0.01, 0.3), st.integers(3, 90), st.integers(3, 90), st.integers(0)
 )
-def test_scattered_triangles_keep_their_colours(
-    triangles: int, extent: float, height: int, width: int, seed: int
-) -> None:
+def test_scattered_triangles_keep_their_colours(triangles, extent, height, width, seed) -> None:
     rng = np.random.default_rng(seed)
     texture = rng.integers(0, 256, (height, width, 3)).astype(np.uint8)
     centres = rng.uniform(extent, 1.0 - extent, (triangles, 1, 2))

@@ -74,9 +74,7 @@ def test_a_rack_hides_what_is_behind_it_and_the_aisle_is_free() -> None:
     assert not lines.blocked(np.array([0.0, 0.0, 1.4]), np.array([[6.0, 0.0, 1.0]]), FINE).any()
 
 
-def test_a_worker_stays_within_its_reach_box_in_every_pose(
-    hall: tuple[Warehouse, list[Worker]],
-) -> None:
+def test_a_worker_stays_within_its_reach_box_in_every_pose(hall) -> None:
     rng = np.random.default_rng(5)
     for worker in hall[1]:
         asset = worker.asset
@@ -142,9 +140,7 @@ def test_the_back_of_a_head_never_shows_a_face(hall: tuple[Warehouse, list[Worke
         assert lines.blocked(eye, ends, np.ones(3, dtype=np.int64)).all()
 
 
-def test_a_person_hides_another_and_a_carried_box_hides_the_chest(
-    hall: tuple[Warehouse, list[Worker]],
-) -> None:
+def test_a_person_hides_another_and_a_carried_box_hides_the_chest(hall) -> None:
     warehouse, (near, far) = hall
     lines = SightLines(warehouse.layout, actors=warehouse.actors)
     eye, detail = np.array([0.0, 0.0, 1.2]), np.full(1, 2)

@@ -29,11 +29,7 @@ _BOXES = st.lists(
 
 
 @given(_BOXES, _PLACES, st.lists(_PLACES, min_size=1, max_size=5))
-def test_a_line_crosses_a_box_where_one_of_its_points_lies_inside(
-    numbers: list[tuple[tuple[float, float], float, float]],
-    start: tuple[float, float],
-    ends: list[tuple[float, float]],
-) -> None:
+def test_a_line_crosses_a_box_where_one_of_its_points_lies_inside(numbers, start, ends) -> None:
     boxes = np.array([(x, y, x + length, y + width) for (x, y), length, width in numbers])
     crossed = crosses_boxes(boxes, start, ends)
     shares = np.linspace(0.0, 1.0, 501)[:, None]
@@ -68,9 +64,7 @@ def test_a_rack_blocks_the_view_and_a_body_that_does_not_count_does_not() -> Non
 @pytest.mark.parametrize(
     ("row", "tolerance_m"), [(0, FACE_DEPTH_M), (FACE_KEYPOINTS, JOINT_DEPTH_M)]
 )
-def test_a_keypoint_is_visible_up_to_its_tolerance_behind_a_surface(
-    row: int, tolerance_m: float
-) -> None:
+def test_a_keypoint_is_visible_up_to_its_tolerance_behind_a_surface(row, tolerance_m) -> None:
     depth = np.full((10, 20), 2.0)
     for behind_m, visible in (
         (-0.5, True),

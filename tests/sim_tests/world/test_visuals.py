@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -23,9 +22,7 @@ CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
 
 
-def test_an_actor_is_asked_for_its_bodies_only_while_it_is_in_view(
-    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
-) -> None:
+def test_an_actor_is_asked_for_its_bodies_only_while_it_is_in_view(hall, add_actor) -> None:
     actor = ball(position_m=(3.0, 0.0, 1.4))
     number = add_actor(actor)
     renderer = CameraRenderer(hall)
@@ -41,9 +38,7 @@ def test_an_actor_is_asked_for_its_bodies_only_while_it_is_in_view(
     assert actor.shown == [pytest.approx(50.0), pytest.approx(50.0)]
 
 
-def test_only_shows_silhouettes_through_everything(
-    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
-) -> None:
+def test_only_shows_silhouettes_through_everything(hall, add_actor) -> None:
     near = ball(0.3, position_m=(2.0, 0.0, 1.4))
     far = ball(0.3, position_m=(4.0, 0.0, 1.4))
     in_the_rack = ball(0.3, position_m=(5.0, 5.9, 1.0))
@@ -64,9 +59,7 @@ def test_only_shows_silhouettes_through_everything(
     np.testing.assert_array_equal(renderer.render(CAMERA, AHEAD).rgb, whole.rgb)
 
 
-def test_a_texture_lies_as_its_coordinates_say_and_multiplies_the_colour(
-    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
-) -> None:
+def test_a_texture_lies_as_its_coordinates_say_and_multiplies_the_colour(hall, add_actor) -> None:
     quarters = np.zeros((8, 8, 3), np.uint8)
     quarters[:4, :4], quarters[:4, 4:] = (200, 0, 0), (0, 200, 0)
     quarters[4:, :4], quarters[4:, 4:] = (0, 0, 200), (200, 200, 200)
