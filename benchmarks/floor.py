@@ -1,7 +1,7 @@
 """Seconds that a policy's limits cost at least, whatever drives (docs/planners.md).
 
 python -m benchmarks.floor --drive  # drive, and look for the fastest way: 20 minutes on two cores
-python -m benchmarks.floor          # the table of the page, from docs/leaderboard/floor.csv
+python -m benchmarks.floor          # the table of the page, from benchmarks/floor.csv
 
 The people of a driven crossing are replayed. Dynamic programming finds the fastest way beside the
 straight line to the goal, at one of eleven offsets, under the limits that held there and then, with
@@ -35,7 +35,7 @@ from sim_tests.study.runs import named_scenarios
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 PAGE: Final = _ROOT / "docs" / "planners.md"
-_ROWS: Final = _ROOT / "docs" / "leaderboard" / "floor.csv"
+_ROWS: Final = Path(__file__).with_name("floor.csv")
 _BLOCK: Final = re.compile(
     r"(<!-- figures: floor .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.DOTALL
 )
