@@ -36,7 +36,7 @@ from ...crossing import named_policy
 from ...crossing.faults import Fault, shipped_faults
 from ...crossing.planner import planner_label, refuse_unusable_planner
 from ...scenario import SCENARIO_SETS, Scenario, shipped_scenarios
-from ...world.errors import SimError
+from ...world.errors import SimError, checked_seed
 from ._run_files import Job
 
 _ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
@@ -88,7 +88,7 @@ def plan_jobs(
     expanded = _expanded(scenarios, axes)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
-    checked_seeds = [_checked_seed(seed) for seed in seeds]
+    checked_seeds = [checked_seed(seed) for seed in seeds]
     names = {name: table_name(value) for name, value in axes.items()}
     for planner in planners:
         if expanded:
@@ -276,13 +276,6 @@ def _named_fault(fault: str | Fault) -> tuple[str, str]:
     if fault.name == NO_FAULT:
         raise SimError(f"a fault must have a name of its own, got {fault.name!r}")
     return fault.name, fault.to_text()
-
-
-def _checked_seed(seed: int) -> int:
-    number = finite_number("seed", seed, SimError, minimum=0)
-    if number != int(seed):
-        raise SimError(f"seed must be a whole number, got {seed!r}")
-    return int(seed)
 
 
 def sample_jobs(jobs: Sequence[Job], count: int, seed: int = 0) -> tuple[Job, ...]:
