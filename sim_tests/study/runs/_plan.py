@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import itertools
+import math
 import re
 import shlex
 from collections import Counter
@@ -44,6 +45,8 @@ _ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
 _PATTERN: Final = re.compile(r"[*?\[]")
 # Makes the draw of a sample independent of the episodes, whose generators have the seed alone.
 _STREAM: Final = 83
+# More conditions do not fit into memory.
+_MOST_EPISODES: Final = 10**7
 
 
 def plan_jobs(
@@ -88,6 +91,10 @@ def plan_jobs(
     expanded = _expanded(scenarios, axes)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
+    seeds = seeds if isinstance(seeds, range) else tuple(seeds)
+    count = math.prod(map(len, (expanded, seeds, fault_texts, planners, policy_texts)))
+    if count > _MOST_EPISODES:  # before their list fills the memory
+        raise SimError(f"a run has at most {_MOST_EPISODES} episodes, got {count}")
     checked_seeds = [checked_seed(seed) for seed in seeds]
     names = {name: table_name(value) for name, value in axes.items()}
     for planner in planners:
