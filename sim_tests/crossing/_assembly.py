@@ -27,7 +27,8 @@ from ..conditions import (
     table_name,
 )
 from ..scenario import SCENARIO_SETS, Scenario, shipped_scenarios
-from ..world.errors import SimError, checked_seed
+from ..world.config import checked_seed
+from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner
 from ._fields import SCANNER_WARNING, FieldsAdapter

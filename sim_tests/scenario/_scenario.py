@@ -27,8 +27,8 @@ from ..actors.behaviour import (
 )
 from ..actors.robot import NOVA_CARTER, RobotModel
 from ..world.camera import CameraTiming, SensorConfig
-from ..world.config import SimConfig
-from ..world.errors import SimError, checked_seed
+from ..world.config import SimConfig, checked_seed
+from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
 from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._distributions import Distribution, error_text, find_parameters, with_numbers

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from awarenav.errors import AwarenavError, MissingExtraError
-from perception.arrays import finite_number
 from perception.installation import install_command
 
 
@@ -17,20 +15,6 @@ class SimError(AwarenavError):
 
 class MissingSimulatorError(SimError, MissingExtraError):
     """PyBullet is not installed; the message names the extra that installs it."""
-
-
-def checked_seed(seed: Any) -> int:
-    """Return the seed of an episode as an int.
-
-    Raises:
-        SimError: for anything but a whole number that is 0 or more.
-    """
-    number = finite_number("seed", seed, SimError)
-    if number < 0.0:
-        raise SimError(f"seed must be 0 or more, got {seed}")
-    if not number.is_integer():
-        raise SimError(f"seed must be a whole number, got {seed!r}")
-    return int(seed)
 
 
 @contextmanager

@@ -37,7 +37,8 @@ from ...crossing import named_policy
 from ...crossing.faults import Fault, shipped_faults
 from ...crossing.planner import planner_label, refuse_unusable_planner
 from ...scenario import SCENARIO_SETS, Scenario, shipped_scenarios
-from ...world.errors import SimError, checked_seed
+from ...world.config import checked_seed
+from ...world.errors import SimError
 from ._run_files import Job
 
 _ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
