@@ -1,4 +1,4 @@
-"""How far and how fast the dynamic window looks ahead and turns, for each robot."""
+"""Times and turns of the motions that the dynamic window compares, for each robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a file or place is told in one line, before networks are asked for."""
+"""A bad file or place is told in one line, before networks are asked for."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def test_more_episodes_than_fit_into_memory_are_refused_at_once():
 
 
 def test_seeds_policies_and_scenarios_are_checked():
-    with pytest.raises(SimError, match="seed must lie in"):
+    with pytest.raises(SimError, match="seed must be 0 or more, got -1"):
         plan_jobs([short()], ["blind"], [-1])
     with pytest.raises(SimError, match="whole number"):
         plan_jobs([short()], ["blind"], [0.5])
