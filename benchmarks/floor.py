@@ -71,6 +71,9 @@ class Way(NamedTuple):
 def fastest_s(limits_mps: FloatArray, gains_mps2: float, brakes_mps2: float) -> float:
     """Return the time of the fastest drive from the first place, standing, to the last.
 
+    Limits count where a step ends. A stretch that is shorter than a step is driven over: bodies,
+    with the robot's outline about them, are longer.
+
     Args:
         limits_mps: (times, places) limits every 0.2 s and 0.1 m; negative where a robot must not
             move. One that brakes fully may be faster.
@@ -93,7 +96,7 @@ def fastest_s(limits_mps: FloatArray, gains_mps2: float, brakes_mps2: float) -> 
             if -brakes <= speed - was <= gains:
                 lowest = 0 if speed - was == -brakes else speed
                 may = (limit >= lowest) | (speed == 0)
-                moved = speed + was
+                moved = min(speed + was, place.size)
                 reached[speed, moved:] |= before[was, : place.size - moved] & may[moved:]
         if reached[: brakes + 1, -cells:].any():
             return step * _STEP_S

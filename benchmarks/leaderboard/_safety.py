@@ -56,7 +56,11 @@ def margin_figures(board: Board, folder: Path) -> str:
     """Return how often the separation margin of the standards was below 0, and whose."""
     named = {each.row.name: each for each in standings(board, folder)}
     lines = []
-    for name, title in ((_AWARE, "`balanced`"), (_BLIND, "`blind`"), (_TODAY, "today's AMR")):
+    for name, title in (
+        (_AWARE, "`balanced`"),
+        (_BLIND, "`blind`"),
+        (_TODAY, "today's AMR that predicts people"),
+    ):
         never = _below(named[name], "min_margin_never_m")
         lines.append(
             f"{title}: in {_below(named[name], 'min_margin_m')}; towards people who had never "

@@ -175,6 +175,8 @@ class ImageInput(Input):
 
     def refuse(self, problem: str, now_s: float) -> None:
         """Report an image that cannot be used: each is, for none may come that can."""
+        with self._shared.lock:
+            self._shared.watch.image_unused(problem)
         self._shared.warn(f"image: {problem}")
 
     def forget(self) -> None:

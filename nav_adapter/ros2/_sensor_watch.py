@@ -74,7 +74,7 @@ class SensorWatch:
             )
         self._scanners, self.lost_after_s = tuple(scanners), lost_after_s
         self._sensors = {name: Sensor(name) for name in names}
-        self._first_image_s, self._depth_unused = math.inf, ""
+        self._first_image_s, self._depth_unused, self._image_unused = math.inf, "", ""
         self._field = (0.0, AHEAD_RAD)
         self.seen = SeenDirections()
         # With the pictures of a camera that may be frozen.
@@ -98,6 +98,10 @@ class SensorWatch:
         if self._sensors[CAMERA].heard:
             self._saw(CAMERA, stamp_s)
             self._maybe.note_field(*self._field, stamp_s)
+
+    def image_unused(self, why: str) -> None:
+        """Note why the latest image cannot be used."""
+        self._image_unused = why
 
     def saw_depth(self, stamp_s: float) -> None:
         """Note a depth image that was used."""
@@ -129,14 +133,17 @@ class SensorWatch:
 
     @property
     def missing_text(self) -> str:
-        """The first sensor that nothing has come from yet, in words; empty if there is none.
+        """The first sensor that nothing of use has come from yet, in words; empty without.
 
+        Of a camera whose images come and cannot be used, it says why the latest cannot.
         Depth images are not waited for: the camera goes on without them.
         """
         for each in self._sensors.values():
             if not each.heard and each.name != DEPTH:
-                camera = each.name == CAMERA
-                return "no camera frame yet" if camera else f"no scan yet from {each.name!r}"
+                if each.name != CAMERA:
+                    return f"no scan yet from {each.name!r}"
+                unused = self._image_unused
+                return f"no usable camera frame yet: {unused}" if unused else "no camera frame yet"
         return ""
 
     @property
@@ -183,7 +190,7 @@ class SensorWatch:
 
     def forget(self) -> None:
         """Forget all that was seen."""
-        self._first_image_s, self._depth_unused = math.inf, ""
+        self._first_image_s, self._depth_unused, self._image_unused = math.inf, "", ""
         self._sensors = {name: Sensor(name) for name in self._sensors}
         self.seen, self._maybe = SeenDirections(), SeenDirections()
 

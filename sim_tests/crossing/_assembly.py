@@ -27,6 +27,7 @@ from ..conditions import (
     table_name,
 )
 from ..scenario import SCENARIO_SETS, Scenario, shipped_scenarios
+from ..world.config import checked_seed
 from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner
@@ -83,8 +84,7 @@ class Setup:
             SimError: an unknown or unusable argument.
             NavError: an unknown preset or unusable policy file.
         """
-        if seed < 0:
-            raise SimError(f"seed must be 0 or more, got {seed}")
+        seed = checked_seed(seed)
         sight = Perception.named(perception)
         refuse_unused_networks(axes, sight.kind)
         drawn = changed(scenario, axes).draw(seed)

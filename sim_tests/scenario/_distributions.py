@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 from pydantic import Field, ValidationError, model_validator
@@ -226,6 +226,8 @@ def find_parameters(data: Mapping[str, Any], source: str) -> dict[str, Distribut
     found: dict[str, Distribution] = {}
     for path, kind, settings in _distributions_in(data, (), source):
         dotted = ".".join(path)
+        if any("." in key for key in path):
+            raise SimError(f"{source}: unknown key in {dotted!r}: no key has a dot")
         if path[0] not in _VARIABLE:
             raise SimError(
                 f"{source}: {dotted}: only numbers under {', '.join(_VARIABLE)} may be "
@@ -249,12 +251,13 @@ def with_numbers(
     for path in values:
         if path not in parameters:
             raise SimError(f"{source}: {not_one_of('a parameter', path, parameters)}")
-    filled = copy.deepcopy(dict(data))
+    filled: dict[str, Any] = copy.deepcopy(dict(data))
     for path, distribution in parameters.items():
         value = values.get(path)
         if value is None:
             value = distribution.median
-        _set_number(filled, path, finite_number(path, value, SimError))
+        number = finite_number(path, value, SimError)
+        filled = _with_number(filled, path.split("."), number)
     return filled
 
 
@@ -265,8 +268,12 @@ def error_text(error: ValidationError) -> str:
     """
     found = []
     for each in error.errors(include_url=False):
-        if each["type"] in ("float_type", "int_type") and isinstance(each["input"], dict):
-            kind = not_one_of("its kind", next(iter(each["input"]), None), DISTRIBUTIONS)
+        given = next(iter(each["input"]), None) if isinstance(each["input"], dict) else None
+        if each["type"] in ("float_type", "int_type") and given is not None:
+            if given in DISTRIBUTIONS:
+                found.append(f"{'.'.join(map(str, each['loc']))}: must be a number, got {given}")
+                continue
+            kind = not_one_of("its kind", given, DISTRIBUTIONS)
             path = ".".join(map(str, each["loc"]))
             found.append(f"{path}: must be a number, or a distribution: {kind}")
         else:
@@ -318,9 +325,13 @@ def _distributions_in(
             yield from _distributions_in(value, (*path, str(number)), source)
 
 
-def _set_number(data: Any, path: str, value: float) -> None:
-    *parents, last = path.split(".")
-    node = data
-    for key in parents:
-        node = node[int(key) if isinstance(node, list) else key]
-    node[int(last) if isinstance(node, list) else last] = value
+def _with_number(node: Any, path: Sequence[str], value: float) -> Any:
+    """Return a tree of mappings and lists with a number at a path."""
+    if not path:
+        return value
+    key, *rest = path
+    if isinstance(node, Mapping):
+        return {**node, key: _with_number(node.get(key), rest, value)}
+    return [
+        _with_number(each, rest, value) if at == int(key) else each for at, each in enumerate(node)
+    ]

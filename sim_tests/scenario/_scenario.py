@@ -27,7 +27,7 @@ from ..actors.behaviour import (
 )
 from ..actors.robot import NOVA_CARTER, RobotModel
 from ..world.camera import CameraTiming, SensorConfig
-from ..world.config import SimConfig
+from ..world.config import SimConfig, checked_seed
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
 from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
@@ -357,14 +357,15 @@ class Scenario(SimConfig):
         path: adding or removing one changes none of the others.
 
         Raises:
-            SimError: if the values drawn are not valid together.
+            SimError: for a seed that is no whole number from 0 on, and if the values drawn are not
+                valid together.
         """
+        seed = checked_seed(seed)
         if not self._distributions:
             return self
         key = np.random.default_rng(seed).integers(0, 2**32, 4, dtype=np.uint64).tolist()
-        return self.with_values(
-            {path: each.quantile(_uniform(key, path)) for path, each in self.distributions.items()}
-        )
+        values = {p: each.quantile(_uniform(key, p)) for p, each in self._distributions.items()}
+        return self._with_values(values, f"{self.name}, seed {seed}")
 
     def with_values(self, values: Mapping[str, float]) -> Scenario:
         """Return the scenario with these values for distributions and the medians of the others.
@@ -372,8 +373,10 @@ class Scenario(SimConfig):
         Raises:
             SimError: for a path without a distribution, and for values that are not valid.
         """
-        data = with_numbers(self._keys, self._distributions, values, self.name)
-        return self._valid(data, self.name)
+        return self._with_values(values, self.name)
+
+    def _with_values(self, values: Mapping[str, float], source: str) -> Scenario:
+        return self._valid(with_numbers(self._keys, self._distributions, values, source), source)
 
     def model_copy(
         self, *, update: Mapping[str, Any] | None = None, deep: bool = False
@@ -469,7 +472,9 @@ class Scenario(SimConfig):
 
 def _robot_of(value: Any, source: str) -> RobotModel:
     try:
-        return RobotModel.model_validate(value) if isinstance(value, dict) else RobotModel.of(value)
+        if not isinstance(value, str):
+            return RobotModel.model_validate(value)
+        return RobotModel.of(value)
     except ValidationError as cause:
         raise SimError(f"{source}: {_FOR_ROBOT}: {error_text(cause)}") from cause
 

@@ -145,12 +145,13 @@ def drawn_problems(scenario: Scenario) -> tuple[str, ...]:
     first: dict[str, str] = {}
     for seed in range(CHECKED_DRAWS if scenario.distributions else 1):
         try:
-            found = scenario_problems(scenario.draw(seed))
-        except SimError as error:
-            found = (str(error),)
+            problems = scenario_problems(scenario.draw(seed))
+            found = [f"{problem} (seed {seed})" for problem in problems]
+        except SimError as error:  # it names the seed
+            found = [str(error)]
         for problem in found:
             # The same problem with other numbers is reported once.
-            first.setdefault(re.sub(r"[-\d.]+", "", problem), f"{problem} (seed {seed})")
+            first.setdefault(re.sub(r"[-\d.]+", "", problem), problem)
     return tuple(first.values())
 
 

@@ -70,6 +70,21 @@ def test_the_robot_stops_as_if_the_camera_were_silent(picture, reason, compresse
     assert robot.bridge.counts["frames"] == frames
 
 
+@pytest.mark.parametrize(("picture", "reason"), [(BLACK, "black"), (GREY, "of one colour")])
+def test_a_camera_that_has_shown_nothing_yet_is_not_one_that_has_sent_nothing(
+    picture, reason
+) -> None:
+    robot = BlindedRobot(make_pipeline=attentive)
+    robot.picture = picture
+    assert (
+        robot.drive(START_S, 0.5)[-1].limited_by
+        == f"no usable camera frame yet: the picture is no view: it is {reason}"
+    )
+    robot.picture = None
+    robot.silent.clear()
+    assert "camera" not in robot.drive(START_S + 0.5, 0.5)[-1].limited_by
+
+
 def test_the_camera_is_back_with_its_first_view() -> None:
     robot = BlindedRobot(make_pipeline=attentive)
     robot.drive(START_S, 1.0)

@@ -247,12 +247,11 @@ class Wheels(Drive):
         return (state.speed_mps if self._steers else max(state.speed_mps, 0.0),)
 
     def _reached(self, speeds: FloatArray, tick: Tick) -> FloatArray:
-        """Return what a tick reaches of speeds; a robot that goes backward brakes upwards."""
-        fall = self._robot.max_deceleration_mps2 * tick.dt_s
-        rise = self._robot.max_acceleration_mps2 * tick.dt_s
-        if tick.state.speed_mps < 0.0:
-            fall, rise = rise, fall
-        return clip_to_window(speeds, tick.state.speed_mps, fall, rise)
+        """Return what a tick reaches of speeds: only towards 0 does the robot brake."""
+        robot, now_mps = self._robot, tick.state.speed_mps
+        fall = robot.max_deceleration_mps2 if now_mps > 0.0 else robot.max_acceleration_mps2
+        rise = robot.max_deceleration_mps2 if now_mps < 0.0 else robot.max_acceleration_mps2
+        return clip_to_window(speeds, now_mps, fall * tick.dt_s, rise * tick.dt_s)
 
     def _made(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import itertools
+import math
 import re
 import shlex
 from collections import Counter
@@ -36,6 +37,7 @@ from ...crossing import named_policy
 from ...crossing.faults import Fault, shipped_faults
 from ...crossing.planner import planner_label, refuse_unusable_planner
 from ...scenario import SCENARIO_SETS, Scenario, shipped_scenarios
+from ...world.config import checked_seed
 from ...world.errors import SimError
 from ._run_files import Job
 
@@ -44,6 +46,8 @@ _ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
 _PATTERN: Final = re.compile(r"[*?\[]")
 # Makes the draw of a sample independent of the episodes, whose generators have the seed alone.
 _STREAM: Final = 83
+# More conditions do not fit into memory.
+_MOST_EPISODES: Final = 10**7
 
 
 def plan_jobs(
@@ -88,7 +92,11 @@ def plan_jobs(
     expanded = _expanded(scenarios, axes)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
-    checked_seeds = [_checked_seed(seed) for seed in seeds]
+    seeds = seeds if isinstance(seeds, range) else tuple(seeds)
+    count = math.prod(map(len, (expanded, seeds, fault_texts, planners, policy_texts)))
+    if count > _MOST_EPISODES:  # before their list fills the memory
+        raise SimError(f"a run has at most {_MOST_EPISODES} episodes, got {count}")
+    checked_seeds = [checked_seed(seed) for seed in seeds]
     names = {name: table_name(value) for name, value in axes.items()}
     for planner in planners:
         if expanded:
@@ -276,13 +284,6 @@ def _named_fault(fault: str | Fault) -> tuple[str, str]:
     if fault.name == NO_FAULT:
         raise SimError(f"a fault must have a name of its own, got {fault.name!r}")
     return fault.name, fault.to_text()
-
-
-def _checked_seed(seed: int) -> int:
-    number = finite_number("seed", seed, SimError, minimum=0)
-    if number != int(seed):
-        raise SimError(f"seed must be a whole number, got {seed!r}")
-    return int(seed)
 
 
 def sample_jobs(jobs: Sequence[Job], count: int, seed: int = 0) -> tuple[Job, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -56,6 +57,10 @@ def test_a_robot_that_steers_reverses_out_of_a_dead_end(x, y, heading_deg) -> No
     assert min(state.speed_mps for state in states) < -0.1
     assert min(state.speed_mps for state in states) >= -0.3 - ROUNDING
     assert min(outline(state, FORKLIFT.footprint_m).distance(racks) for state in states) > 0.03
+    for before, state in pairwise(states):
+        if before.speed_mps * state.speed_mps >= 0.0:  # it speeds up alike either way
+            faster_mps = abs(state.speed_mps) - abs(before.speed_mps)
+            assert faster_mps <= FORKLIFT.max_acceleration_mps2 * DT_S + ROUNDING
     for state in states:
         assert abs(state.yaw_rate_radps) <= abs(state.speed_mps) / 1.3 + ROUNDING
         # Forward and backward, the corners keep the limit too.

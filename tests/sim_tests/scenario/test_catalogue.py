@@ -132,6 +132,14 @@ def test_impossible_positions_are_reported():
     assert scenario_problems(replay) == ("replay_csv: there is no file nowhere.csv",)
 
 
+def test_a_problem_of_a_draw_names_its_seed_once():
+    person = {"name": "a", "speed_mps": {"choice": [-1.0, 1.0, 1.2]}}
+    person["route"] = [{"x_m": 4.0, "y_m": 0.0}, {"x_m": 6.0, "y_m": 0.0}]
+    data = {"name": "mine", "duration_s": 9.0, "robot": {"goal_x_m": 9.0}, "people": [person]}
+    problems = [each for each in drawn_problems(Scenario.from_data(data)) if "speed_mps" in each]
+    assert [each.count("seed") for each in problems] == [1]
+
+
 def test_show_describes_what_varies_and_writes_yaml_that_can_be_read_back(capsys, tmp_path):
     assert main(["scenario", "show", "stops_midway"]) == 0
     output = capsys.readouterr().out

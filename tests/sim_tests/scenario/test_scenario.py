@@ -173,11 +173,50 @@ def test_a_file_extends_shared_defaults_and_finds_its_recording_in_its_folder(tm
         ({"spede_mps": 1.0}, "did you mean 'speed_mps'"),
         ({"speed_mps": "fast"}, r"people\.0\.speed_mps.*got 'fast'"),
         ({"name": {"choice": [1, 2]}}, r"people\.0\.name"),
+        ({"look.coat": {"choice": [1, 2]}}, r"unknown key in 'people\.0\.look\.coat'"),
+        (
+            {"speed_mps": {"uniform": {"low": {"uniform": {"low": 1, "high": 2}}, "high": 3}}},
+            r"speed_mps: uniform: low: must be a number, got uniform",
+        ),
     ],
 )
 def test_impossible_values_are_refused_by_path(change, message):
     with pytest.raises(SimError, match=message):
         varied(**change)
+
+
+@pytest.mark.parametrize("robot", [3, ["forklift"], {"unknown": 1}])
+def test_what_is_no_robot_is_refused_by_its_key(robot):
+    with pytest.raises(SimError, match="scenario: for_robot: "):
+        Scenario.from_data({**BASE, "for_robot": robot})
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, None, [1, 2], True])
+def test_what_is_no_seed_draws_nothing(seed):
+    with pytest.raises(SimError, match="seed must be"):
+        varied().draw(seed)
+
+
+def test_a_seed_may_be_of_any_integer_type_and_length():
+    scenario = varied(speed_mps={"uniform": {"low": 1, "high": 2}})
+    assert scenario.draw(np.int64(3)) == scenario.draw(3)
+    assert scenario.draw(10**40) == scenario.draw(10**40) != scenario.draw(10**40 + 1)
+
+
+def test_a_draw_that_is_not_valid_names_its_seed():
+    """The lowest of three choices is drawn by the seeds that draw the first of other three."""
+    valid, refused = (varied(speed_mps={"choice": [low, 1, 1.2]}) for low in (0.5, -1))
+    seed = next(seed for seed in range(20) if valid.draw(seed).people[0].speed_mps == 0.5)
+    with pytest.raises(SimError, match=rf"mine, seed {seed}: people\.0\.speed_mps: .* got -1"):
+        refused.draw(seed)
+
+
+def test_people_may_be_a_tuple():
+    people = ({**BASE["people"][0], "speed_mps": {"uniform": {"low": 1, "high": 2}}},)
+    listed = {**BASE, "people": list(people)}
+    assert Scenario.from_data({**BASE, "people": people}).draw(1) == Scenario.from_data(
+        listed
+    ).draw(1)
 
 
 def test_only_numbers_of_people_and_robot_may_be_distributions():

@@ -63,8 +63,13 @@ def test_unusable_arguments_are_refused_before_anything_runs(options, message):
         plan_jobs([short()], ["blind"], [0], **options)
 
 
+def test_more_episodes_than_fit_into_memory_are_refused_at_once():
+    with pytest.raises(SimError, match="at most 10000000 episodes, got 200000000"):
+        plan_jobs(["late_glance"], ["blind", "balanced"], range(10**8))
+
+
 def test_seeds_policies_and_scenarios_are_checked():
-    with pytest.raises(SimError, match="seed must lie in"):
+    with pytest.raises(SimError, match="seed must be 0 or more, got -1"):
         plan_jobs([short()], ["blind"], [-1])
     with pytest.raises(SimError, match="whole number"):
         plan_jobs([short()], ["blind"], [0.5])
