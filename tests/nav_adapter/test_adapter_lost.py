@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import (
     ROBOT,
@@ -84,6 +84,7 @@ def test_the_limit_rises_from_where_it_was_at_the_rate_of_the_policy() -> None:
     assert after[-1].limited_by == "robot maximum"
 
 
+@settings(max_examples=30)
 @given(st.floats(1.0, 7.0), st.floats(-math.pi, math.pi))
 def test_no_limit_of_a_robot_that_stands_jumps_when_somebody_is_dropped(away_m, bearing_rad):
     nav = NavAdapter(POLICY, ROBOT)

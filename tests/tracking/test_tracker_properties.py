@@ -169,7 +169,7 @@ def assert_same(
             assert getattr(other, name) == pytest.approx(getattr(one, name), abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     x_m=st.floats(-100.0, 100.0),

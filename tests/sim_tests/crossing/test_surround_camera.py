@@ -83,8 +83,8 @@ def panorama(stage: Stage, T_odom_camera: np.ndarray, width_px: int) -> np.ndarr
 
 
 def test_the_shipped_networks_detect_all_people_in_a_panorama(scenario: Scenario) -> None:
-    lens = PanoramaLens(2400, 1200)
-    flat = Camera.from_fov(1092, 828, math.radians(110.0))
+    lens = PanoramaLens(1600, 800)
+    flat = Camera.from_fov(728, 552, math.radians(110.0))
     views = ring_of_views(flat, np.radians([0, 90, 180, -90]))
     shipped = partial(AwarenessPipeline, simulator_networks=True)
     pipeline = SurroundPipeline(lens, views, shipped)

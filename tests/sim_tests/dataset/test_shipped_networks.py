@@ -16,7 +16,7 @@ from perception import AwarenessPipeline, Camera
 from sim_tests.dataset import RenderConfig, RenderScene
 
 HELD_OUT = RenderConfig(
-    frames=72,
+    frames=54,
     scenes=5,
     min_range_m=1.5,
     max_range_m=6.0,

@@ -12,7 +12,6 @@ from awarenav.cli import main
 from sim_tests import Scenario, run_crossing
 from sim_tests.demo import _demo
 from sim_tests.demo._encounter import CASES, case_values
-from sim_tests.world.camera import CameraTiming
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +71,7 @@ def encounter_in_pixels():
     # The last of the paper's three cases is at 16.25 s. Each needs an image of its own alone: of
     # one in 13 frames, there is one at most 2 frames from each case.
     scenario = Scenario.shipped("paper_encounter")
-    camera = scenario.camera.model_copy(update={"timing": CameraTiming(rate_hz=60.0 / 13.0)})
-    scenario = scenario.model_copy(update={"duration_s": 16.5, "camera": camera})
+    scenario = scenario.model_copy(update={"duration_s": 16.5, "control_hz": 60.0 / 13.0})
     return run_crossing(scenario, policy="balanced", perception="pixels", seed=0)
 
 

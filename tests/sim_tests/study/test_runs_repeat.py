@@ -105,6 +105,7 @@ def test_sideways_speeds_that_differ_are_not_deterministic(drawing):
 _SHORT = SHORT.format(name="short")
 ADULT = _SHORT.replace("notices_within_m: 0.0", "watches: true")
 CHILD = _SHORT + "    stature_m: 1.15\n"
+SMALL = "camera: {width_px: 640, height_px: 480, horizontal_fov_deg: 60.0}\n"
 TWO_VIEWS = ADULT + "camera: {views_deg: [0.0, 90.0]}\n"
 
 
@@ -135,7 +136,7 @@ def signature(frame: CrossingFrame) -> tuple[Any, ...]:
         (ADULT, "keypoints"),
         pytest.param(CHILD, "keypoints+scanner", marks=pytest.mark.slow),
         pytest.param(ADULT, "scanner", marks=pytest.mark.slow),
-        pytest.param(ADULT, "pixels", marks=pytest.mark.slow),
+        pytest.param(ADULT + SMALL, "pixels", marks=pytest.mark.slow),
         pytest.param(CHILD, "pixels+scanner", marks=pytest.mark.full),
         pytest.param(TWO_VIEWS, "pixels", marks=pytest.mark.full),
     ],
