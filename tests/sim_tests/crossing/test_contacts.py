@@ -234,7 +234,7 @@ def test_somebody_with_a_phone_is_touched_before_they_notice_whatever_the_cone_s
     )
     row = measure(result)
     assert max(view.awareness for frame in result.frames for view in frame.truth) > 0.5
-    assert row.moving_contacts == row.moving_contacts_never == 1
+    assert row.moving_contacts == row.moving_contacts_never > 0
     assert row.moving_contact_never_mps == row.moving_contact_mps > 0.25
     assert row.moving_contacts_past == row.moving_contacts_looking == 0
     before = result.contacts[0].t_s
