@@ -112,22 +112,16 @@ def test_every_test_named_in_the_safety_argument_exists() -> None:
     assert checked >= 12
 
 
-def reach(
-    name: str, alpha: float, x_m: float = 0.0, y_m: float = 0.0, *, walks: float = 0.0
-) -> Reach:
-    policy = AwarenessPolicy.preset(name)
-    speed_mps, unaware_mps = (policy.speed.human_speed_mps(each) for each in (alpha, 0.0))
-    return Reach(
-        *(x_m, y_m, walks, 0.0, speed_mps),
+def test_an_aware_person_who_walks_may_stop_or_walk_on() -> None:
+    policy = AwarenessPolicy.preset("balanced")
+    aware_mps, unaware_mps = map(policy.speed.human_speed_mps, (1.0, 0.0))
+    walker = Reach(
+        *(0.0, 0.0, 1.2, 0.0, aware_mps),
         policy.reach.time_constant_s,
         policy.reach.delay_s,
         margin_m=policy.margins.floor_m,
-        within_m=policy.margins.within_m(speed_mps, unaware_mps),
+        within_m=policy.margins.within_m(aware_mps, unaware_mps),
     )
-
-
-def test_an_aware_person_who_walks_may_stop_or_walk_on() -> None:
-    walker = reach("balanced", 1.0, walks=1.2)
     assert walker.radius_m(1.8) == pytest.approx(0.33, abs=0.005)
     assert walker.may_walk_on
     assert 1.2 * walker.walking_on().drift_s(2.0) == pytest.approx(2.4, abs=0.01)
