@@ -40,6 +40,10 @@ class Number(click.FloatRange):
             self.fail(f"must be finite, got {value}", param, ctx)
         return number
 
+    def _describe_range(self) -> str:
+        """Return the limits as help says them; click has "x<=None" for none."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 #: A whole number of at least 1.
 POSITIVE: Final = Whole(1)

@@ -41,6 +41,7 @@ def test_help_says_what_a_command_and_each_of_its_options_does(path, capsys):
         assert "Examples:\n  " in text
         assert "Exit status:\n  0 " in text
     assert 'default: ""' not in text
+    assert "=None" not in text
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
