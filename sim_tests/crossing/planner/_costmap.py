@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from perception.arrays import FloatArray
 
+from ._drives import Tick
 from ._geometry import FootprintBox, Poses
 from ._sampling import CLEARANCE_M
 from ._scene import Aim, Scene
@@ -67,8 +68,8 @@ class CostmapPlanner(DynamicWindow):
         )
         return super().plan(robot_state, goal_odom_m, replace(constraints, obstacles=people), dt_s)
 
-    def _aim(self, goal: Aim, scene: Scene) -> Aim:
-        return past_people(goal, scene, self._footprint)
+    def _headed(self, tick: Tick, goal_odom_m: FloatArray, constraints: NavConstraints) -> Tick:
+        return tick._replace(aim=past_people(tick.aim, tick.scene, self._footprint))
 
 
 def past_people(goal: Aim, scene: Scene, footprint: FootprintBox) -> Aim:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,14 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from nav_adapter.exporters import speed_limit_at
 from perception.anthropometry import BODY_RADIUS_M
-from perception.arrays import FloatArray, finite_array, finite_number
+from perception.arrays import FloatArray
 
-from ...world.errors import SimError
 from ._drives import Tick
 from ._geometry import Poses, box_gap_m
 from ._sampling import CLEARANCE_M
-from ._scene import Aim, Scene
-from ._window import DynamicWindow, within_next_limits
+from ._scene import Aim
+from ._window import DynamicWindow
 
 # Ways are offsets to the left of the straight line to the goal.
 _OFFSETS_M: Final[FloatArray] = np.array(
@@ -101,48 +99,31 @@ class ReferencePlanner(DynamicWindow):
         self._plan_stamp_s = -math.inf
         self._offset_m, self._cap_mps, self._holds_s = 0.0, math.inf, 0.0
 
-    def plan(
-        self,
-        robot_state: RobotState,
-        goal_odom_m: ArrayLike,
-        constraints: NavConstraints,
-        dt_s: float,
-    ) -> tuple[float, ...]:
-        """Choose the command for the next tick; see the base class."""
-        goal_odom_m = finite_array("goal_odom_m", goal_odom_m, (2,), SimError)
-        dt_s = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
-        goal = Aim.at(goal_odom_m, robot_state)
-        limits = self._limits(constraints)
-        if constraints.speed_basis is None or not constraints.obstacles:
-            return super().plan(robot_state, goal_odom_m, constraints, dt_s)
-        if goal.distance_m < _ARRIVING_M or limits.speed_mps <= 0.0:
-            return super().plan(robot_state, goal_odom_m, constraints, dt_s)
+    def _headed(self, tick: Tick, goal_odom_m: FloatArray, constraints: NavConstraints) -> Tick:
+        state, distance_m = tick.state, tick.aim.distance_m
+        planned = constraints.speed_basis is not None and constraints.obstacles
+        if not planned or distance_m < _ARRIVING_M:
+            return tick
         if self._line is None or not np.array_equal(goal_odom_m, self._goal_odom_m):
-            self._begin(robot_state, goal_odom_m)
+            self._begin(state, goal_odom_m)
         assert self._line is not None
         line = self._line
-        from_start = robot_state.position_odom_m - line.start_odom_m
+        from_start = state.position_odom_m - line.start_odom_m
         s_m, d_m = float(from_start @ line.along), float(from_start @ line.left)
         now = constraints.stamp_s
         if not self._plan_stamp_s <= now < self._plan_stamp_s + _EVERY_S - 1e-9:
             self._plan_stamp_s = now
-            self._choose_way(robot_state, constraints, s_m, d_m)
-        top_mps = self._top_mps(limits, goal)
-        if now - self._plan_stamp_s < self._holds_s:
-            top_mps = min(top_mps, self._cap_mps)
-        ahead_m = s_m + min(_HEAD_M + _HEAD_S * robot_state.travel_mps, line.length_m - s_m)
+            self._choose_way(state, constraints, s_m, d_m)
+        held = now - self._plan_stamp_s < self._holds_s
+        ahead_m = s_m + min(_HEAD_M + _HEAD_S * state.travel_mps, line.length_m - s_m)
         offset_m, _ = self._offsets(np.array([ahead_m]), s_m, d_m, np.array([self._offset_m]))
         place = line.start_odom_m + ahead_m * line.along + float(offset_m[0]) * line.left
-        # As far as the goal, so that the way there is worth full speed.
-        aim = Aim(goal.distance_m, Aim.at(place, robot_state).bearing_rad)
-        bodies = tuple(
-            replace(each, radius_m=min(each.radius_m, _ROOM_M)) for each in constraints.obstacles
+        return tick._replace(
+            top_mps=min(tick.top_mps, self._cap_mps) if held else tick.top_mps,
+            # As far as the goal, so that the way there is worth full speed.
+            aim=Aim(distance_m, Aim.at(place, state).bearing_rad),
+            scene=tick.scene.within(_ROOM_M),
         )
-        scene = Scene.around(
-            robot_state, replace(constraints, obstacles=bodies), self._boxes_odom_m
-        )
-        command = self._command(Tick(robot_state, limits, top_mps, aim, dt_s, scene), goal)
-        return within_next_limits(command, robot_state, constraints, dt_s)
 
     def _begin(self, state: RobotState, goal_odom_m: FloatArray) -> None:
         """Lay the line to a new goal."""

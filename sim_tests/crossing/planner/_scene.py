@@ -121,6 +121,11 @@ class Scene:
             ),
         )
 
+    def within(self, radius_m: float) -> Scene:
+        """Return the scene with nobody's disc larger than a radius."""
+        people = (each._replace(radius_m=min(each.radius_m, radius_m)) for each in self.people)
+        return replace(self, people=tuple(people))
+
     def people_gap_m(self, robot: Rectangles, t_s: FloatArray) -> FloatArray:
         """Return the gap (P, T, V, W) from the robot to each person's disc, ``t_s`` from now."""
         x_m, y_m, vx_mps, vy_mps, radius_m = self._columns

@@ -130,13 +130,13 @@ class DynamicWindow:
         if limits.speed_mps <= 0.0 or goal.distance_m <= GOAL_TOLERANCE_M:
             return self._drive.brake(robot_state, dt_s)
         scene = Scene.around(robot_state, constraints, self._boxes_odom_m)
-        top_mps = self._top_mps(limits, goal)
-        tick = Tick(robot_state, limits, top_mps, self._aim(goal, scene), dt_s, scene)
-        return within_next_limits(self._command(tick, goal), robot_state, constraints, dt_s)
+        straight = Tick(robot_state, limits, self._top_mps(limits, goal), goal, dt_s, scene)
+        command = self._command(self._headed(straight, goal_odom_m, constraints), goal)
+        return within_next_limits(command, robot_state, constraints, dt_s)
 
-    def _aim(self, goal: Aim, scene: Scene) -> Aim:
-        """Return the place to head for on the way to the goal."""
-        return goal
+    def _headed(self, tick: Tick, goal_odom_m: FloatArray, constraints: NavConstraints) -> Tick:
+        """Return the tick with the place to head for on the way to the goal."""
+        return tick
 
     def _limits(self, constraints: NavConstraints) -> TwistLimits:
         """Return the twists that the robot may have now."""
