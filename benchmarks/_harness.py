@@ -1,14 +1,24 @@
-"""Command line shared by all benchmarks: baseline, output file, and exit status."""
+"""Shared by all benchmarks: command line, baseline, exit status, and figures in pages."""
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 from awarenav.baseline import MeasuredValue, read_baseline, worse_than, write_baseline
 from awarenav.errors import AwarenavError
+
+# A part of a page that is made from rows, between two comments.
+_PART: Final = re.compile(r"(<!-- figures: (\w+) .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.S)
+
+
+def with_figures(page: str, parts: Mapping[str, str]) -> str:
+    """Return the text of a page with the parts, by name, between its comments."""
+    return _PART.sub(lambda found: f"{found[1]}{parts[found[2]]}{found[3]}", page)
 
 
 def count(text: str) -> int:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import csv
 import math
-import re
 import sys
 from collections.abc import Sequence
 from itertools import product
@@ -23,7 +22,7 @@ import numpy as np
 import shapely
 from joblib import Parallel, delayed
 
-from benchmarks._harness import make_parser
+from benchmarks._harness import make_parser, with_figures
 from nav_adapter.exporters import speed_limit_at
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
@@ -36,9 +35,6 @@ from sim_tests.study.runs import named_scenarios
 _ROOT: Final = Path(__file__).resolve().parents[1]
 PAGE: Final = _ROOT / "docs" / "planners.md"
 _ROWS: Final = Path(__file__).with_name("floor.csv")
-_BLOCK: Final = re.compile(
-    r"(<!-- figures: floor .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.DOTALL
-)
 _COLUMNS: Final = ("scenario", "policy", "seed", "lost_s", "floor_s")
 _POLICIES: Final = ("scanner", "balanced")
 _SEEDS: Final = (90, 91, 92)
@@ -189,7 +185,7 @@ def table() -> str:
 
 def page(text: str) -> str:
     """Return the text of the page with the present table."""
-    return _BLOCK.sub(lambda found: f"{found[1]}{table()}{found[2]}", text)
+    return with_figures(text, {"floor": table()})
 
 
 def main() -> int:

@@ -9,7 +9,6 @@ python -m benchmarks.learning                # the page and its picture, from do
 from __future__ import annotations
 
 import csv
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -21,7 +20,7 @@ import numpy as np
 
 from awarenav.errors import AwarenavError
 from awarenav.figures import Figure, new_figure, save_figure
-from benchmarks._harness import make_parser
+from benchmarks._harness import make_parser, with_figures
 from sim_tests import LocalPlanner
 from sim_tests.crossing import Crossing
 from sim_tests.crossing.planner import make_planner
@@ -48,9 +47,6 @@ _FAR, _NEAR = 10.0, 1.5
 _SEED: Final = 0
 _WINDOW: Final = 50
 _REFERENCE: Final = "reference planner"
-_TABLE: Final = re.compile(
-    r"(<!-- figures: learning .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.DOTALL
-)
 
 Episode = tuple[float, str, int, float]  # return, end, steps, seconds
 Act = Callable[[CrossingEnv, dict[str, Any]], Any]
@@ -223,7 +219,7 @@ def figure() -> Figure:
 
 def page(text: str) -> str:
     """Return the text of the page with the present table."""
-    return _TABLE.sub(lambda found: f"{found[1]}{table()}{found[2]}", text)
+    return with_figures(text, {"learning": table()})
 
 
 def main() -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from benchmarks._harness import with_figures
 from benchmarks.nav2 import summary
 from sim_tests.demo import reported_table, reported_text
 from sim_tests.study.measures import EpisodeRecord, Interval, bootstrap_interval, paired
@@ -25,7 +25,6 @@ COLUMNS: Final = ("**awarenav**", "slow for all", "AMRs of today")
 _FILES: Final = ("README.md", "docs/simulation_results.md", "docs/safety.md")
 #: Pages with parts that are made here, each between two comments.
 PAGES: Final = tuple(ROOT / name for name in _FILES)
-_PART: Final = re.compile(r"(<!-- figures: (\w+) .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.S)
 
 
 def write_figures(board: Board) -> None:
@@ -37,11 +36,6 @@ def write_figures(board: Board) -> None:
     parts = figures(board)
     for page in PAGES:
         page.write_text(with_figures(page.read_text("utf-8"), parts), "utf-8")
-
-
-def with_figures(page: str, parts: Mapping[str, str]) -> str:
-    """Return the text of a page with the parts between its comments."""
-    return _PART.sub(lambda found: f"{found[1]}{parts[found[2]]}{found[3]}", page)
 
 
 def figures(board: Board, folder: Path = RESULTS) -> dict[str, str]:

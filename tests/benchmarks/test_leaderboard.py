@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks._harness import with_figures
 from benchmarks.leaderboard import (
     PAGE,
     RESULTS,
@@ -25,7 +26,6 @@ from benchmarks.leaderboard._results import (
     figures,
     over_scenarios,
     times,
-    with_figures,
 )
 from sim_tests import SimError
 from sim_tests.scenario import Scenario
